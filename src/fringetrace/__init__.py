@@ -1,0 +1,64 @@
+"""Triangle meshes to full-field interferograms, with a phase you can trust.
+
+>>> import fringetrace as ft
+>>> from fringetrace import mm, nm
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.metadata import version as _version
+from typing import TYPE_CHECKING, Any
+
+from fringetrace.field import complex_field
+from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.paths import Fate, Ledger, Paths
+from fringetrace.rays import Rays
+from fringetrace.scene import CCD, Beam, Gaussian, Mesh, Scene, Surface
+from fringetrace.trace import stream, trace
+from fringetrace.waves import degree, mm, nm, um
+
+if TYPE_CHECKING:
+    from fringetrace import instruments, meshes, phase, views
+
+__version__ = _version("fringetrace")
+
+__all__ = [
+    "CCD",
+    "Absorber",
+    "Beam",
+    "BeamSplitter",
+    "Fate",
+    "Gaussian",
+    "Ledger",
+    "Mesh",
+    "Mirror",
+    "Paths",
+    "Rays",
+    "Scene",
+    "Surface",
+    "complex_field",
+    "degree",
+    "instruments",
+    "meshes",
+    "mm",
+    "nm",
+    "phase",
+    "stream",
+    "trace",
+    "um",
+    "views",
+]
+
+# rooms that are imported at first use
+_ROOMS = ("instruments", "meshes", "phase", "views")
+
+
+def __getattr__(name: str) -> Any:
+    if name in _ROOMS:
+        return import_module(f"fringetrace.{name}")
+    raise AttributeError(f"module 'fringetrace' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_ROOMS])

@@ -1,0 +1,266 @@
+"""A bench: a scene, its beam and its CCD, traced once; what is recorded with it, and what follows."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from fringetrace import phase
+from fringetrace.field import complex_field
+from fringetrace.paths import Paths
+from fringetrace.scene import CCD, Beam, Scene
+from fringetrace.trace import stream, trace
+from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength, wavenumber
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """An interferometer: a scene lit by one beam, seen by one CCD, with a reference mirror.
+
+    It is traced once; wavelengths and phase steps then re-use the paths.
+
+    Parameters
+    ----------
+    scene : Scene
+    beam : Beam
+    ccd : CCD
+    reference : int
+        Number of the surface that sends the reference wave back, and that a phase step moves.
+    tilt : (tilt_x, tilt_y), radians
+        Tilt of that mirror, see `michelson`.
+    """
+
+    scene: Scene
+    beam: Beam
+    ccd: CCD
+    reference: int
+    tilt: tuple[float, float] = (0.0, 0.0)
+    # the paths once traced, and the fields of the last wavelength
+    derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "derived": {}}
+
+    def trace(
+        self, *, progress: Callable[[int, int], None] | None = None, threads: int | None = None
+    ) -> Paths:
+        """All paths of the bench, traced at the first call and kept.
+
+        Parameters
+        ----------
+        progress : callable, optional
+            Called with the rays done and the rays in all.
+        threads : int, optional
+            Default: all cores.
+
+        Returns
+        -------
+        Paths
+        """
+        if "paths" not in self.derived:
+            self.derived["paths"] = trace(self.scene, self.beam, self.ccd, progress=progress, threads=threads)
+        paths: Paths = self.derived["paths"]
+        return paths
+
+    def sampled(self, shape: tuple[int, int]) -> Paths:
+        """Paths of a coarser grid of rays over the same beam, with their polylines, to look at.
+
+        Parameters
+        ----------
+        shape : (rows, columns)
+
+        Returns
+        -------
+        Paths
+        """
+        beam = replace(self.beam, shape=shape)
+        return trace(self.scene, beam, self.ccd, record=True)
+
+    def fields(self, wavelength: float) -> ComplexArray:
+        """Fields on the CCD, one for each number of visits to the reference mirror.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+
+        Returns
+        -------
+        (n, rows, columns) complex128, n at least 2
+            [0] is the light that met the sample only, [1] the reference. A phase step of delta
+            on the reference multiplies [m] by exp(i m delta).
+        """
+        wavelength = checked_wavelength(wavelength)
+        if self.derived.get("wavelength") != wavelength:
+            self.derived["fields"] = self._summed(self.trace().detected, wavelength)
+            self.derived["wavelength"] = wavelength
+        fields: ComplexArray = self.derived["fields"]
+        return fields
+
+    def stream_fields(
+        self,
+        wavelength: float,
+        *,
+        progress: Callable[[int, int], None] | None = None,
+        threads: int | None = None,
+    ) -> ComplexArray:
+        """`fields`, summed while tracing: no path is kept, so memory does not grow with the rays.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+        progress, threads
+            See `trace`.
+
+        Returns
+        -------
+        (n, rows, columns) complex128
+        """
+        total = np.zeros((2, *self.ccd.shape), dtype=np.complex128)
+        chunks = stream(self.scene, self.beam, self.ccd, progress=progress, threads=threads)
+        for paths in chunks:
+            part = self._summed(paths.detected, wavelength)
+            if len(part) > len(total):
+                total, part = part, total
+            total[: len(part)] += part
+        return total
+
+    def _summed(self, paths: Paths, wavelength: float) -> ComplexArray:
+        visits = paths.visits(self.reference)
+        orders = range(max(2, int(visits.max(initial=0)) + 1))
+        return np.stack([complex_field(paths.where(visits == order), wavelength) for order in orders])
+
+    def field(self, wavelength: float, step: float = 0.0) -> ComplexArray:
+        """Field on the CCD.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+        step : float, radians
+            Phase added to the reference at each visit to its mirror.
+
+        Returns
+        -------
+        (rows, columns) complex128
+        """
+        fields = self.fields(wavelength)
+        turns = np.exp(1j * step * np.arange(len(fields)))
+        return np.asarray(np.tensordot(turns, fields, axes=1), dtype=np.complex128)
+
+    def interferogram(self, wavelength: float, *, modulus: bool = False) -> FloatArray:
+        """What the CCD records.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+        modulus : bool
+            |E| instead of the irradiance |E|^2.
+
+        Returns
+        -------
+        (rows, columns) float64
+            1 where a beam of unit irradiance would fall straight on the CCD.
+        """
+        modulus_of_field = np.abs(self.field(wavelength))
+        return np.asarray(modulus_of_field if modulus else modulus_of_field**2, dtype=np.float64)
+
+    def phase_steps(self, wavelength: float, steps: int = 4) -> FloatArray:
+        """Frames of a phase-stepped recording: frame k adds 2 pi k / steps to the reference.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+        steps : int, at least 3
+
+        Returns
+        -------
+        (steps, rows, columns) float64
+            |E|^2; nothing is traced again.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than 3 steps.
+        """
+        if steps < 3:
+            raise ValueError(f"phase steps: expected at least 3, got {steps}")
+        shifts = 2.0 * math.pi * np.arange(steps) / steps
+        return np.stack([np.abs(self.field(wavelength, shift)) ** 2 for shift in shifts])
+
+    def carrier(self, wavelength: float) -> FloatArray:
+        """Phase of the tilted reference wave over the pixels, 0 at the centre of the image.
+
+        A plane wave off a plane mirror turned by a: its path on the CCD rises by sin 2a a metre
+        along the tilt, exactly.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+
+        Returns
+        -------
+        (rows, columns) float64, radians, not wrapped
+        """
+        rows, columns = self.ccd.shape
+        x = (np.arange(columns) + 0.5 - 0.5 * columns) * self.ccd.pitch
+        y = (np.arange(rows) + 0.5 - 0.5 * rows) * self.ccd.pitch
+        slope_x, slope_y = path_slope(self.tilt)
+        path = slope_x * x[None, :] + slope_y * y[:, None]
+        return np.asarray(wavenumber(wavelength) * path, dtype=np.float64)
+
+    def wrapped(self, wavelength: float, steps: int = 4) -> FloatArray:
+        """Phase by which the reference leads the sample, from phase-stepped frames, wrapped.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+        steps : int, at least 3
+
+        Returns
+        -------
+        (rows, columns) float64, radians
+            Carrier included; NaN where either arm brings no light.
+        """
+        frames = self.phase_steps(wavelength, steps)
+        lit = (self.fields(wavelength)[:2] != 0.0).all(axis=0)
+        return np.where(lit, phase.n_bucket(frames), np.nan)
+
+    def height(self, wavelength: float, steps: int = 4) -> FloatArray:
+        """Height of the sample, the way one measures it: phase steps, carrier off, unwrap, scale.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+        steps : int, at least 3
+
+        Returns
+        -------
+        (rows, columns) float64, metres
+            Up to a constant (the piston, and whole half wavelengths); NaN where either arm brings
+            no light. Steps between neighbouring pixels must stay under wavelength / 4.
+        """
+        measured = self.wrapped(wavelength, steps)
+        flat = phase.wrap(measured - self.carrier(wavelength))
+        return phase.height(phase.unwrap(flat), wavelength)
+
+
+def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:
+    """Rise of the optical path of a beam off a tilted plane mirror, on a plane across the beam.
+
+    A mirror tilted by a turns the beam by 2a; the plane wave's path then rises by sin 2a a
+    metre in the direction of the tilt.
+
+    Parameters
+    ----------
+    tilt : (tilt_x, tilt_y), radians
+
+    Returns
+    -------
+    (slope_x, slope_y), metres a metre
+    """
+    angle = math.hypot(*tilt)
+    scale = math.sin(2.0 * angle) / angle if angle > 0.0 else 2.0
+    return scale * tilt[0], scale * tilt[1]

@@ -1,0 +1,165 @@
+"""Ready benches."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from fringetrace.bench import Bench
+from fringetrace.interfaces import BeamSplitter, Interface, Mirror
+from fringetrace.scene import CCD, Beam, Mesh, Profile, Scene, Surface
+from fringetrace.shapes import plate
+from fringetrace.vectors import rotation
+from fringetrace.waves import FloatArray
+
+__all__ = ["Bench", "michelson"]
+
+# Parts of the arm: the splitter reaches SPAN up, down and to the sides; an arm is SHORTEST apertures
+# long or longer. A reference mirror tilted by up to TILT (radians) and moved by up to PISTON arms then
+# sends all of its light back through the splitter, and touches nothing.
+SPAN = 0.6
+SHORTEST = 2.0
+TILT = 0.1
+PISTON = 0.2
+
+
+def michelson(
+    sample: Mesh | Surface,
+    *,
+    aperture: float,
+    reference_tilt: tuple[float, float] = (0.0, 0.0),
+    piston: float = 0.0,
+    pixels: tuple[int, int] = (512, 512),
+    rays: int = 1,
+    profile: Profile | None = None,
+    arm: float | None = None,
+    splitter: Interface = BeamSplitter(),  # noqa: B008 - frozen
+    mirror: Interface = Mirror(),  # noqa: B008 - frozen
+    focus: bool = True,
+) -> Bench:
+    """A Michelson (Twyman-Green) interferometer with the sample in one arm.
+
+    The splitter stands at the origin at 45 degrees. The source at (-arm, 0, 0) fires along +x;
+    half of the light goes down to the sample at (0, 0, -arm), half on to the reference mirror
+    at (+arm, 0, 0); what comes back meets on the CCD at (0, 0, +arm), whose rows lie along y
+    and whose columns lie along x of the sample.
+
+    Parameters
+    ----------
+    sample : Mesh (or trimesh.Trimesh), or Surface, metres
+        In its own coordinates: z is the height towards the light, x = y = 0 the optical axis.
+        A mesh becomes a mirror; a Surface brings its own interface.
+    aperture : float, metres
+        Width of the beam and of the image; the height follows from the pixels, which are square.
+    reference_tilt : (tilt_x, tilt_y), radians
+        The path of the reference rises by 2 tilt_x a metre along x, 2 tilt_y along y.
+    piston : float, metres
+        Displacement of the reference mirror away from the splitter: its path is 2 piston longer.
+    pixels : (rows, columns)
+    rays : int
+        Rays a pixel, along either axis: rays**2 in all, from the centres of its parts.
+    profile : callable, optional
+        Amplitude of the beam at (x, y) of the image, metres; None is uniform. See `Gaussian`.
+    arm : float, metres, optional
+        Length of the arms; default twice the larger side of the aperture.
+    splitter, mirror : Interface
+        Of the splitter and of the reference mirror.
+    focus : bool
+        The CCD sees the plane z = 0 of the sample through an ideal 1:1 relay; False: bare CCD.
+
+    Returns
+    -------
+    Bench
+
+    Raises
+    ------
+    ValueError
+        If a length, a number of pixels or of rays is not positive; if the arm is too short for
+        the aperture or the sample; if the tilt would lead the reference beam off the bench.
+    TypeError
+        If the sample is no mesh.
+    """
+    size, arm = _layout(aperture, pixels, rays, arm)
+    _check_reference(reference_tilt, piston, arm)
+    surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
+    _check_sample(surface, arm)
+    half, (rows, columns) = SPAN * arm, pixels
+    crossing = plate(2.0 * half * math.sqrt(2.0), 2.0 * half)
+    facing = plate(half, half).moved(turn=_reference_turn(reference_tilt))
+    scene = Scene(
+        [
+            Surface(crossing.moved(turn=rotation((0.0, 1.0, 0.0), math.pi / 4.0)), splitter, "splitter"),
+            replace(surface, mesh=surface.mesh.moved((0.0, 0.0, -arm))),
+            Surface(facing.moved((arm + piston, 0.0, 0.0)), mirror, "reference"),
+        ]
+    )
+    beam = Beam(
+        centre=(-arm, 0.0, 0.0), direction=(1.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), size=size,
+        shape=(rows * rays, columns * rays), profile=None if profile is None else partial(_seen, profile),
+    )  # fmt: skip
+    ccd = CCD(
+        centre=(0.0, 0.0, arm), normal=(0.0, 0.0, -1.0), up=(0.0, 1.0, 0.0), pitch=aperture / columns,
+        shape=(rows, columns), focus=2.0 * arm if focus else 0.0,
+    )  # fmt: skip
+    return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt)
+
+
+def _layout(
+    aperture: float, pixels: tuple[int, int], rays: int, arm: float | None
+) -> tuple[tuple[float, float], float]:
+    """Width and height of the beam and the length of the arms, once they are known to fit."""
+    if not (math.isfinite(aperture) and aperture > 0.0):
+        raise ValueError(f"michelson aperture: expected a positive length in metres, got {aperture!r}")
+    if len(pixels) != 2 or not all(isinstance(n, int) and n > 0 for n in pixels):
+        raise ValueError(f"michelson pixels: expected positive whole (rows, columns), got {pixels!r}")
+    if not isinstance(rays, int) or rays < 1:
+        raise ValueError(f"michelson rays: expected a positive whole number, got {rays!r}")
+    size = (aperture, aperture * pixels[0] / pixels[1])
+    arm = 2.0 * max(size) if arm is None else arm
+    if not (math.isfinite(arm) and arm >= SHORTEST * max(size)):
+        raise ValueError(
+            f"michelson arm: expected at least {SHORTEST} times the aperture, {SHORTEST * max(size):g} m, "
+            f"got {arm!r}"
+        )
+    return size, arm
+
+
+def _check_reference(tilt: tuple[float, float], piston: float, arm: float) -> None:
+    """Refuse what would lead the reference beam off the bench."""
+    if not math.hypot(*tilt) <= TILT:
+        raise ValueError(f"michelson reference_tilt: expected up to {TILT} rad, got {tilt!r}")
+    if not abs(piston) <= PISTON * arm:
+        raise ValueError(
+            f"michelson piston: expected up to {PISTON} times the arm, {PISTON * arm:g} m, got {piston!r}"
+        )
+
+
+def _check_sample(sample: Surface, arm: float) -> None:
+    """Refuse a sample that would touch the splitter."""
+    top, room = float(sample.mesh.bounds[1, 2]), (1.0 - SPAN) * arm
+    if not top < room:
+        raise ValueError(
+            f"michelson sample: expected heights under {room:g} m, where the splitter begins, got {top:g} m; "
+            "give a longer arm, or move the sample so that z = 0 is the plane to be seen"
+        )
+
+
+def _reference_turn(tilt: tuple[float, float]) -> FloatArray:
+    """Turn of a plate from facing +z to facing -x, tilted.
+
+    The splitter shows (x, y, z) of the mirror at (-z, y, -x): tilted about (0, -tilt_x, -tilt_y),
+    it stands in the image with the normal (sin a tilt_x / a, sin a tilt_y / a, cos a).
+    """
+    facing = rotation((0.0, 1.0, 0.0), -0.5 * math.pi)
+    angle = math.hypot(*tilt)
+    if angle == 0.0:
+        return facing
+    return np.asarray(rotation((0.0, -tilt[0], -tilt[1]), angle) @ facing, dtype=np.float64)
+
+
+def _seen(profile: Profile, x: FloatArray, y: FloatArray) -> FloatArray:
+    """A profile over the image as one over the beam: the splitter turns the beam's x into -x."""
+    return profile(-x, y)

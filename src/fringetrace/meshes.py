@@ -1,0 +1,260 @@
+"""Meshes and height maps in files: load, save, read; and the height of a mesh above points.
+
+Meshes are `fringetrace.scene.Mesh`, in metres. Height maps are arrays [row, column] with origin
+lower: column counts along x, row along y, heights along z, seen from +z.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import warnings
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.scene import Mesh
+from fringetrace.shapes import checked_length, height_map
+from fringetrace.triangles import IndexArray, height_above, weld
+from fringetrace.waves import FloatArray, unit_length
+
+WRITTEN = (".glb", ".obj", ".ply", ".stl")
+METROPRO = ".dat"
+# First four bytes of the three versions of Zygo's format.
+METROPRO_MAGIC = (b"\x88\x1b\x03\x6f", b"\x88\x1b\x03\x70", b"\x88\x1b\x03\x71")
+
+
+def _existing(path: str | os.PathLike[str]) -> Path:
+    if not Path(path).is_file():
+        raise FileNotFoundError(f"{path}: expected an existing file, got none there")
+    return Path(path)
+
+
+def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
+    """Mesh from a file: STL, PLY, OBJ, GLB, and whatever else trimesh can read; or Zygo MetroPro `.dat`.
+
+    Vertices with equal coordinates are welded and faces without area dropped; faces keep their
+    order. A file of several parts becomes one mesh, each part where the file puts it.
+
+    Parameters
+    ----------
+    path : path-like
+    unit : str
+        Unit of the numbers in the file, such as ``"um"``: mesh files carry none. Only a MetroPro
+        file knows its own, and `unit` is not looked at.
+
+    Returns
+    -------
+    Mesh, metres
+        A MetroPro file gives ``height_map(*read_height_map(path))``.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If the kind of file is unknown, the unit missing or unknown, the file empty or not
+        what its name says, or what is in it is no mesh (see `Mesh`).
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix == METROPRO:
+        z, pitch = read_height_map(path)
+        return height_map(z, pitch, name=Path(path).name)
+    from trimesh.exchange.load import mesh_formats
+
+    known = sorted({METROPRO} | {f".{kind}" for kind in mesh_formats()})
+    if suffix not in known:
+        raise ValueError(f"{path}: expected a file named {', '.join(known)}, got {suffix or 'no suffix'!r}")
+    file = _existing(path)
+    scale = unit_length(unit, f"{file.name} unit")
+    vertices, faces = weld(*_parsed(file))
+    try:
+        return Mesh.cleaned(vertices * scale, faces, file.name)
+    except ValueError:
+        return Mesh(vertices * scale, faces, file.name)  # names the faces if none had an area
+
+
+def _parsed(file: Path) -> tuple[FloatArray, IndexArray]:
+    """Vertices and faces of all parts, in the file's unit."""
+    import trimesh
+
+    if file.suffix.lower() == ".obj":
+        _refuse_relative(file)
+    try:
+        with warnings.catch_warnings():
+            # numpy before 2.3 only warns, and leaves out the rest of the numbers
+            warnings.filterwarnings("error", message="string or file could not be read")
+            scene = trimesh.load_scene(file, process=False, skip_materials=True, maintain_order=True)
+    except Exception as error:  # parsers of ten formats raise all kinds
+        kind = file.suffix[1:].upper()
+        raise ValueError(
+            f"{file}: expected {kind} data, got something that does not parse: {error}"
+        ) from error
+    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
+    for node in scene.graph.nodes_geometry:
+        pose, name = scene.graph[node]
+        part = scene.geometry[name]
+        if isinstance(part, trimesh.Trimesh):
+            vertices.append(np.asarray(part.vertices) @ pose[:3, :3].T + pose[:3, 3])
+            turned = np.linalg.det(pose[:3, :3]) < 0.0  # a mirrored part shows its back
+            faces.append(np.asarray(part.faces)[:, :: -1 if turned else 1] + count)
+            count += len(part.vertices)
+    if sum(map(len, faces)) == 0:
+        raise ValueError(f"{file}: expected triangles, got a file without any")
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def _refuse_relative(file: Path) -> None:
+    """Vertex numbers counted back from the current line are misread by trimesh, without a word."""
+    with file.open("rb") as lines:
+        for count, line in enumerate(lines, 1):
+            words = line.split()
+            if words[:1] == [b"f"] and any(word.startswith((b"-", b"0")) for word in words[1:]):
+                face = line.decode(errors="replace").strip()
+                raise ValueError(f"{file}: expected vertex numbers from 1 up, got {face!r} in line {count}")
+
+
+def save(mesh: Mesh, path: str | os.PathLike[str], unit: str) -> None:
+    """Write a mesh to a STL (binary), PLY, OBJ or GLB file.
+
+    OBJ keeps coordinates to 17 decimals of the unit, the others keep 7 digits (float32). The file
+    is written beside its target and then moved into place.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    path : path-like
+    unit : str
+        Unit of the numbers in the file, such as ``"um"``.
+
+    Raises
+    ------
+    ValueError
+        If the kind of file or the unit is unknown.
+    OSError
+        If the file cannot be written.
+    """
+    import trimesh
+
+    file = Path(path)
+    kind = file.suffix.lower()
+    if kind not in WRITTEN:
+        raise ValueError(f"{path}: expected a file named {', '.join(WRITTEN)}, got {kind or 'no suffix'!r}")
+    scaled = trimesh.Trimesh(
+        mesh.vertices / unit_length(unit, f"{file.name} unit"), mesh.faces, process=False
+    )
+    options: dict[str, Any] = {"digits": 17, "include_normals": False} if kind == ".obj" else {}
+    content: Any = scaled.export(file_type=kind[1:], **options)
+    beside = file.with_name(f".{file.name}.{os.getpid()}.part")
+    try:
+        beside.write_bytes(content.encode() if isinstance(content, str) else content)
+        os.replace(beside, file)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def read_height_map(path: str | os.PathLike[str]) -> tuple[FloatArray, float]:
+    """Measured heights from a Zygo MetroPro `.dat` file.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    z : (rows, columns) float64, metres
+        NaN where the instrument found no height. The file begins with the top row of the picture;
+        here row 0 is the bottom one.
+    pitch : float, metres
+        Distance of neighbouring pixels.
+
+    Raises
+    ------
+    FileNotFoundError
+        If there is no such file.
+    ValueError
+        If it is no MetroPro file, is cut short, or was written without a lateral calibration.
+    """
+    file = _existing(path)
+    if file.suffix.lower() != METROPRO:
+        raise ValueError(f"{path}: expected a MetroPro height map named {METROPRO}, got {file.suffix!r}")
+    with file.open("rb") as stream:
+        magic = stream.read(4)
+    if magic not in METROPRO_MAGIC:
+        raise ValueError(f"{path}: expected a MetroPro file, got one that begins with {magic!r}")
+    from prysm.io import read_zygo_dat
+
+    try:
+        content = read_zygo_dat(file)
+    except Exception as error:  # a header cut short raises struct.error, odd ones KeyError
+        raise ValueError(
+            f"{path}: expected a whole MetroPro file, got one that does not parse: {error}"
+        ) from error
+    meta = content["meta"]
+    pitch = float(meta["lateral_resolution"])
+    if not pitch > 0.0:
+        raise ValueError(f"{path}: expected a calibrated map, got a lateral resolution of {pitch:g} m")
+    upwards = -1.0 if meta["sign"] else 1.0  # prysm leaves the header's sign to its caller
+    # prysm gives nanometres
+    return np.asarray(content["phase"][::-1] * (upwards * 1e-9), dtype=np.float64), pitch
+
+
+def elevation_sample(relief: float, aperture: float) -> tuple[FloatArray, float]:
+    """Matplotlib's sample elevation map, scaled down to something a laser can measure.
+
+    The file is that of the Jacksboro fault, Tennessee, from the Shuttle radar: 344 x 403 samples,
+    three seconds of arc apart, 840 m of relief over some 30 km. Both are scaled linearly, the
+    ground to `aperture` and the heights to `relief`, and the samples are taken as square.
+
+    Parameters
+    ----------
+    relief : float, metres
+        Peak to valley; the lowest sample is at 0.
+    aperture : float, metres
+        Distance of the first and the last sample of a row, the longer side.
+
+    Returns
+    -------
+    z : (344, 403) float64, metres
+        Row 0 is the southern edge.
+    pitch : float, metres
+
+    Raises
+    ------
+    ValueError
+        If a length is not positive.
+    FileNotFoundError
+        If matplotlib was installed without its sample data.
+    """
+    relief, aperture = checked_length(relief, "relief"), checked_length(aperture, "aperture")
+    found = importlib.util.find_spec("matplotlib")  # finds the folder without importing it
+    folder = Path(found.origin).parent if found is not None and found.origin else Path()
+    file = folder / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
+    with np.load(_existing(file), allow_pickle=False) as data:
+        metres = data["elevation"][::-1].astype(np.float64)
+    z = relief * (metres - metres.min()) / np.ptp(metres)
+    return z, aperture / (max(z.shape) - 1)
+
+
+def interpolate_height(mesh: Mesh, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
+    """Height of a mesh over points of the x-y plane, in float64 and without the ray engine.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    x, y : float64, metres, shapes that broadcast
+
+    Returns
+    -------
+    float64, metres, the common shape
+        z of the topmost face there, linear within it; NaN beside the mesh and in its holes.
+        Upright faces have no height.
+    """
+    points = np.stack(np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64)), axis=-1)
+    height = np.full(points.shape[:-1], np.nan)
+    somewhere = np.isfinite(points).all(axis=-1)
+    if somewhere.any():
+        height[somewhere] = height_above(mesh.vertices[mesh.faces], points[somewhere])
+    return height

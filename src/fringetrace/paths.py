@@ -1,0 +1,344 @@
+"""What came out of a trace: where each path ended and why, its optical path, and the power ledger."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.rays import Rays
+from fringetrace.scene import CCD, Beam, Scene
+from fringetrace.vectors import frame
+from fringetrace.waves import Array, ComplexArray, FloatArray
+
+
+class Fate(IntEnum):
+    """Why a path ended."""
+
+    DETECTED = 0
+    LEFT = 1
+    ABSORBED = 2
+    TRUNCATED = 3
+    FAINT = 4
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Where the power went, in units of |amplitude|^2 * m^2 (or of rays, where they have no area).
+
+    `truncated` is what was cut off by the number of bounces or by the least amplitude.
+    """
+
+    incident: float
+    detected: float
+    left: float
+    absorbed: float
+    truncated: float
+
+    @property
+    def error(self) -> float:
+        """Power unaccounted for, relative to the incident power."""
+        total = self.detected + self.left + self.absorbed + self.truncated
+        return abs(total - self.incident) / self.incident if self.incident else abs(total)
+
+    def __add__(self, other: Ledger) -> Ledger:
+        """Sum of two ledgers, item by item."""
+        mine, theirs = vars(self), vars(other)
+        return Ledger(**{name: mine[name] + theirs[name] for name in mine})
+
+
+@dataclass(frozen=True, eq=False)
+class Paths:
+    """One row for each end of a path, sorted by ray; a ray that splits has several.
+
+    Attributes
+    ----------
+    ray : (m,) int64
+        Number of the ray in its batch, or in its beam's scan order.
+    fate : (m,) int8
+        A `Fate`.
+    bounces : (m,) int32
+        Surfaces met: reflections and transmissions.
+    reflections : (m,) int32
+        How many of them were reflections off mirrors.
+    length : (m,) float64, metres
+        Optical path up to the last hit, or to the CCD (to the plane that it is focused on).
+    origin : (m, 3) float64, metres
+        The last hit, or the point in the CCD's plane.
+    direction : (m, 3) float64, unit
+        Direction in which the path went on, or arrived.
+    amplitude : (m,) complex128
+        Launched amplitude times that of every surface on the way; 0 where absorbed.
+    lost : (m,) float64
+        Power absorbed on the way, relative to unit amplitude.
+    key : (m,) uint64
+        Names the sequence of surfaces and branches; equal sequences have equal keys.
+    pixel : (m, 2) float64
+        CCD coordinates (row, column) in pixels, pixel [i, j] spans [i, i+1) x [j, j+1); NaN if
+        not detected.
+    area : float or None, m^2
+        Beam cross-section that each ray stands for.
+    incident : float
+        Sum of |amplitude|^2 of the rays that were launched.
+    segments : int
+        Ray segments traced.
+    doubtful : int
+        Hits that were decided exactly.
+    surface, triangle : (m, b) int64, or None unless recorded
+        Surface and its triangle at each bounce, padded with -1.
+    points : (m, b + 2, 3) float64, metres, or None unless recorded
+        Start, hits, and the end on the CCD, padded with NaN.
+    scene, source, ccd
+        What was traced.
+    """
+
+    ray: npt.NDArray[np.int64]
+    fate: npt.NDArray[np.int8]
+    bounces: npt.NDArray[np.int32]
+    reflections: npt.NDArray[np.int32]
+    length: FloatArray
+    origin: FloatArray
+    direction: FloatArray
+    amplitude: ComplexArray
+    lost: FloatArray
+    key: npt.NDArray[np.uint64]
+    pixel: FloatArray
+    area: float | None
+    incident: float
+    segments: int
+    doubtful: int
+    scene: Scene
+    source: Beam | Rays
+    ccd: CCD | None
+    surface: npt.NDArray[np.int64] | None = None
+    triangle: npt.NDArray[np.int64] | None = None
+    points: FloatArray | None = None
+
+    def __len__(self) -> int:
+        return len(self.ray)
+
+    def where(self, mask: Array) -> Paths:
+        """Some of the paths.
+
+        Parameters
+        ----------
+        mask : (m,) bool, or indices
+
+        Returns
+        -------
+        Paths
+            The incident power, segments and doubtful hits stay those of the whole trace.
+        """
+        chosen = {name: getattr(self, name)[mask] for name in COLUMNS if getattr(self, name) is not None}
+        return replace(self, **chosen)
+
+    @property
+    def detected(self) -> Paths:
+        """The paths that reached the CCD."""
+        return self.where(self.fate == Fate.DETECTED)
+
+    def sequence(self, row: int) -> list[tuple[int, bool]]:
+        """Surfaces that a path met and whether it went through them (decoded from its key).
+
+        Parameters
+        ----------
+        row : int
+
+        Returns
+        -------
+        list of (surface number, transmitted)
+
+        Raises
+        ------
+        ValueError
+            If the path has too many bounces for a 64-bit key to tell.
+        """
+        digits = self._digits(self.key[row : row + 1], self.bounces[row : row + 1])[0]
+        return [((int(d) - 1) // 2, d % 2 == 0) for d in digits]
+
+    def visits(self, surface: int) -> npt.NDArray[np.int64]:
+        """How often each path met a surface.
+
+        Parameters
+        ----------
+        surface : int
+
+        Returns
+        -------
+        (m,) int64
+
+        Raises
+        ------
+        ValueError
+            If a path has too many bounces for its key to tell.
+        """
+        pair = np.stack([self.key, self.bounces.astype(np.uint64)], axis=1)
+        kinds, which = np.unique(pair, axis=0, return_inverse=True)
+        digits = self._digits(kinds[:, 0], kinds[:, 1].astype(np.int64))
+        return np.asarray(((digits - 1) // 2 == surface).sum(axis=1)[which.ravel()], dtype=np.int64)
+
+    def _digits(self, keys: Array, bounces: Array) -> Array:
+        """Digits of keys, one for each bounce, padded with -1."""
+        base = 2 * len(self.scene.surfaces) + 1
+        most, depth = int(64 / np.log2(base)), int(bounces.max(initial=0))
+        if depth > most:
+            raise ValueError(
+                f"path key: expected at most {most} bounces among {len(self.scene.surfaces)} surfaces to "
+                f"tell their sequence, got {depth}; trace with record=True and read Paths.surface"
+            )
+        digits = np.full((len(keys), depth), -1, dtype=np.int64)
+        rest = keys.copy()
+        for back in range(1, depth + 1):
+            rows = np.flatnonzero(bounces >= back)
+            digits[rows, bounces[rows] - back] = (rest[rows] % np.uint64(base)).astype(np.int64)
+            rest[rows] //= np.uint64(base)
+        return digits
+
+    def polyline(self, row: int) -> FloatArray:
+        """The points that a path went through.
+
+        Parameters
+        ----------
+        row : int
+
+        Returns
+        -------
+        (k, 3) float64, metres
+            Start, each hit, and the point on the CCD if it got there.
+
+        Raises
+        ------
+        ValueError
+            If the trace did not record them.
+        """
+        if self.points is None:
+            raise ValueError("polyline: expected paths traced with record=True, got paths without points")
+        points = self.points[row]
+        return np.asarray(points[np.isfinite(points[:, 0])], dtype=np.float64)
+
+    def ledger(self) -> Ledger:
+        """Power by fate; adds up to the incident power for the paths of a whole trace.
+
+        Returns
+        -------
+        Ledger
+        """
+        unit = 1.0 if self.area is None else self.area
+        power = np.abs(self.amplitude) ** 2
+        by_fate = np.bincount(self.fate, weights=power, minlength=len(Fate)) * unit
+        return Ledger(
+            incident=self.incident * unit,
+            detected=float(by_fate[Fate.DETECTED]),
+            left=float(by_fate[Fate.LEFT]),
+            absorbed=float(self.lost.sum() * unit),
+            truncated=float(by_fate[Fate.TRUNCATED] + by_fate[Fate.FAINT]),
+        )
+
+
+COLUMNS = (
+    "ray", "fate", "bounces", "reflections", "length", "origin", "direction", "amplitude", "lost", "key",
+    "pixel", "surface", "triangle", "points",
+)  # fmt: skip
+
+
+def pixels(ccd: CCD, point: FloatArray) -> FloatArray:
+    """CCD coordinates of points in its plane of focus.
+
+    Parameters
+    ----------
+    ccd : CCD
+    point : (n, 3) float64, metres
+
+    Returns
+    -------
+    (n, 2) float64
+        (row, column) in pixels; pixel [i, j] spans [i, i+1) x [j, j+1).
+    """
+    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
+    offset = point - ccd.centre
+    rows, columns = ccd.shape
+    return np.stack([offset @ v / ccd.pitch + 0.5 * rows, offset @ u / ccd.pitch + 0.5 * columns], axis=1)
+
+
+def project(paths: Paths, ccd: CCD) -> Paths:
+    """Let the light that left a scene fall on a CCD beyond it, without a new trace.
+
+    Parameters
+    ----------
+    paths : Paths
+        Traced without a CCD.
+    ccd : CCD
+        Blocks nothing: light reaches it past any surface.
+
+    Returns
+    -------
+    Paths
+        Those that reach the CCD are detected there.
+    """
+    u, v, n = frame(ccd.normal, ccd.up, "CCD")
+    facing = paths.direction @ n
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = ((ccd.centre - paths.origin) @ n) / facing
+        ahead = (paths.fate == Fate.LEFT) & (facing < 0.0) & (reach > 0.0)
+        reach = np.where(ahead, reach + ccd.focus / facing, 0.0)
+    point = paths.origin + reach[:, None] * paths.direction
+    offset = point - ccd.centre
+    width, height = ccd.size
+    x, y = offset @ u, offset @ v
+    seen = ahead & (abs(x) <= 0.5 * width) & (x < 0.5 * width) & (abs(y) <= 0.5 * height) & (y < 0.5 * height)
+    pixel = np.where(seen[:, None], pixels(ccd, point), np.nan)
+    return replace(
+        paths,
+        fate=np.where(seen, np.int8(Fate.DETECTED), paths.fate),
+        length=np.where(seen, paths.length + reach, paths.length),
+        origin=np.where(seen[:, None], point, paths.origin),
+        pixel=pixel,
+        ccd=ccd,
+    )
+
+
+def _padded(columns: Sequence[Array], width: int) -> Array:
+    """Arrays of different widths, one below the other."""
+    fill = np.nan if columns[0].dtype.kind == "f" else -1
+    total = sum(len(column) for column in columns)
+    table = np.full((total, width, *columns[0].shape[2:]), fill, dtype=columns[0].dtype)
+    row = 0
+    for column in columns:
+        table[row : row + len(column), : column.shape[1]] = column
+        row += len(column)
+    return table
+
+
+def join(parts: Sequence[Paths]) -> Paths:
+    """Paths of consecutive rays of one source as one table.
+
+    Parameters
+    ----------
+    parts : sequence of Paths
+        In the order of their rays; at least one.
+
+    Returns
+    -------
+    Paths
+    """
+    if len(parts) == 1:
+        return parts[0]
+    columns: dict[str, Array] = {}
+    for name in COLUMNS:
+        arrays = [getattr(part, name) for part in parts]
+        if arrays[0] is None:
+            continue
+        if name in ("surface", "triangle", "points"):
+            columns[name] = _padded(arrays, max(array.shape[1] for array in arrays))
+        else:
+            columns[name] = np.concatenate(arrays)
+    return replace(
+        parts[0],
+        **columns,
+        incident=sum(part.incident for part in parts),
+        segments=sum(part.segments for part in parts),
+        doubtful=sum(part.doubtful for part in parts),
+    )

@@ -1,0 +1,252 @@
+"""The batch of rays, a struct of arrays; launching one from a beam."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Real
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.scene import Beam, as_names
+from fringetrace.vectors import frame, unit
+from fringetrace.waves import Array, ComplexArray, FloatArray
+
+
+def _rows_of_three(value: npt.ArrayLike, what: str) -> FloatArray:
+    try:
+        rows = np.ascontiguousarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{what}: expected numbers of shape (n, 3), got {error}") from error
+    if rows.ndim != 2 or rows.shape[1] != 3:
+        raise ValueError(f"{what}: expected shape (n, 3), got {rows.shape}")
+    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(bad):
+        raise ValueError(
+            f"{what}: expected finite numbers, got NaN or infinity in {len(bad)} of {len(rows)} rays "
+            f"(first: ray {bad[0]})"
+        )
+    return rows
+
+
+@dataclass(frozen=True, eq=False)
+class Rays:
+    """Rays to be traced.
+
+    Parameters
+    ----------
+    origin : (n, 3) float64, metres
+    direction : (n, 3) float64
+        Scaled to unit length.
+    length : (n,) float64, metres, optional
+        Optical path that each ray brings along; default 0.
+    amplitude : (n,) complex128, optional
+        Default 1.
+    area : float, m^2, optional
+        Beam cross-section that one ray stands for. None: rays are just counted.
+    passes : names of surfaces that the rays pass over on their first leg.
+
+    Raises
+    ------
+    ValueError
+        For shapes that differ, numbers that are not finite, directions of length 0.
+    """
+
+    origin: FloatArray
+    direction: FloatArray
+    length: FloatArray | None = None
+    amplitude: ComplexArray | None = None
+    area: float | None = None
+    passes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        origin = _rows_of_three(self.origin, "Rays origin")
+        direction = _rows_of_three(self.direction, "Rays direction")
+        if len(origin) != len(direction):
+            raise ValueError(
+                f"Rays direction: expected one for each of {len(origin)} origins, got {len(direction)}"
+            )
+        still = np.flatnonzero(~direction.any(axis=1))
+        if len(still):
+            raise ValueError(f"Rays direction: expected a direction, got length 0 (first: ray {still[0]})")
+        object.__setattr__(self, "origin", origin)
+        object.__setattr__(self, "direction", unit(direction) if len(direction) else direction)
+        object.__setattr__(self, "length", self._column(self.length, 0.0, np.float64, "length"))
+        object.__setattr__(self, "amplitude", self._column(self.amplitude, 1.0, np.complex128, "amplitude"))
+        object.__setattr__(self, "passes", as_names(self.passes))
+        area = self.area
+        if area is not None and not (isinstance(area, Real) and np.isfinite(area) and area > 0.0):
+            raise ValueError(f"Rays area: expected a positive area in m^2, got {self.area!r}")
+
+    def _column(self, value: npt.ArrayLike | None, default: float, dtype: type, what: str) -> Array:
+        if value is None:
+            return np.full(len(self.origin), default, dtype=dtype)
+        try:
+            column: Array = np.array(value, dtype=dtype)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"Rays {what}: expected numbers of shape (n,), got {error}") from error
+        if column.shape != (len(self.origin),):
+            raise ValueError(f"Rays {what}: expected shape ({len(self.origin)},), got {column.shape}")
+        if not np.isfinite(column).all():
+            raise ValueError(f"Rays {what}: expected finite numbers, got NaN or infinity")
+        return column
+
+    def __len__(self) -> int:
+        return len(self.origin)
+
+    def part(self, start: int, stop: int) -> Rays:
+        """The rays from `start` up to `stop`.
+
+        Parameters
+        ----------
+        start, stop : int
+
+        Returns
+        -------
+        Rays
+            Views of the same arrays.
+        """
+        columns = {name: getattr(self, name)[start:stop] for name in ("origin", "direction", "length", "amplitude")}
+        return _trusted(**columns, area=self.area, passes=self.passes)
+
+
+def _trusted(**fields: object) -> Rays:
+    """Rays from arrays that are known to be right, without another look at each number."""
+    rays = object.__new__(Rays)
+    for name, value in fields.items():
+        object.__setattr__(rays, name, value)
+    return rays
+
+
+def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
+    """Rays of a beam, from the centres of its grid cells, row by row.
+
+    Parameters
+    ----------
+    beam : Beam
+    start, stop : int
+        Which rays, in scan order (row * columns + column), as in a slice; default all.
+
+    Returns
+    -------
+    Rays
+        Amplitude is the beam's profile; a uniform beam has unit irradiance.
+
+    Raises
+    ------
+    ValueError
+        If the profile gives something other than one finite number a ray.
+    """
+    from fringetrace import kernels
+
+    rows, columns = beam.shape
+    start, stop, _ = slice(start, stop).indices(rows * columns)
+    count = max(0, stop - start)
+    u, v, n = frame(beam.direction, beam.up, "Beam")
+    origin, direction = np.empty((count, 3)), np.empty((count, 3))
+    kernels.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
+    amplitude = np.ones(count, dtype=np.complex128)
+    if beam.profile is not None:
+        offset = origin - beam.centre
+        values = np.asarray(beam.profile(offset @ u, offset @ v))
+        if values.shape not in ((), (count,)) or not np.isfinite(values).all():
+            raise ValueError(
+                f"Beam profile: expected a finite amplitude for each of {count} rays, "
+                f"got shape {values.shape} or others"
+            )
+        amplitude[:] = values
+    return _trusted(
+        origin=origin,
+        direction=direction,
+        length=np.zeros(count),
+        amplitude=amplitude,
+        area=beam.area,
+        passes=beam.passes,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Rays under way: one row a path, changed in place by the bounce passes.
+
+    Lengths in metres. `last` is the triangle last left (-1: none), `normal` and `edge` its normal
+    and the distance of the start from its nearest edge (unit box); `straight` says that the ray
+    went through it. `lost` is the power given off on the way, `parent` the row a row split from.
+    """
+
+    origin: FloatArray
+    direction: FloatArray
+    normal: FloatArray
+    length: FloatArray
+    edge: FloatArray
+    lost: FloatArray
+    amplitude: ComplexArray
+    key: npt.NDArray[np.uint64]
+    ray: npt.NDArray[np.int64]
+    parent: npt.NDArray[np.int64]
+    last: npt.NDArray[np.int64]
+    bounces: npt.NDArray[np.int32]
+    reflections: npt.NDArray[np.int32]
+    fate: npt.NDArray[np.int8]
+    straight: npt.NDArray[np.bool_]
+
+    def grown(self, capacity: int) -> Batch:
+        """The same rows in arrays with room for `capacity` of them."""
+        return Batch(**{name: _enlarged(column, capacity) for name, column in vars(self).items()})
+
+    def part(self, start: int, stop: int) -> Batch:
+        """Views of some rows."""
+        return Batch(**{name: column[start:stop] for name, column in vars(self).items()})
+
+
+def _enlarged(column: Array, capacity: int) -> Array:
+    larger = np.empty((capacity, *column.shape[1:]), dtype=column.dtype)
+    larger[: len(column)] = column
+    return larger
+
+
+def blank(rows: int) -> Batch:
+    """Room for a batch of so many rows, not filled in."""
+    return Batch(
+        origin=np.empty((rows, 3)),
+        direction=np.empty((rows, 3)),
+        normal=np.empty((rows, 3)),
+        length=np.empty(rows),
+        edge=np.empty(rows),
+        lost=np.empty(rows),
+        amplitude=np.empty(rows, dtype=np.complex128),
+        key=np.empty(rows, dtype=np.uint64),
+        ray=np.empty(rows, dtype=np.int64),
+        parent=np.empty(rows, dtype=np.int64),
+        last=np.empty(rows, dtype=np.int64),
+        bounces=np.empty(rows, dtype=np.int32),
+        reflections=np.empty(rows, dtype=np.int32),
+        fate=np.empty(rows, dtype=np.int8),
+        straight=np.empty(rows, dtype=np.bool_),
+    )
+
+
+def start(state: Batch, rays: Rays, first: int, alive: int) -> None:
+    """Fill a batch with rays at their start.
+
+    Parameters
+    ----------
+    state : Batch
+        As many rows as there are rays.
+    rays : Rays
+    first : int
+        Number of the first of them.
+    alive : int
+        The fate code of rays that go on.
+    """
+    state.origin[:] = rays.origin
+    state.direction[:] = rays.direction
+    state.length[:] = rays.length
+    state.amplitude[:] = 1.0  # of the path alone: the launched amplitude is multiplied in at the end
+    state.ray[:] = np.arange(first, first + len(rays))
+    state.last[:] = -1
+    state.fate[:] = alive
+    for column in (state.normal, state.edge, state.lost, state.key, state.parent, state.bounces):
+        column[:] = 0
+    state.reflections[:] = 0
+    state.straight[:] = False

@@ -1,0 +1,455 @@
+"""The nouns of a scene, checked once, at the door: Mesh, Surface, Beam, CCD, Scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from numbers import Real
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.interfaces import Interface
+from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, frame
+from fringetrace.waves import Array, FloatArray
+
+# A face is degenerate when its height is below this part of its longest side: less than what
+# float64 coordinates can express, and far below any needle that still has a normal.
+DEGENERATE = 1e-14
+# float64 keeps 16 digits: a mesh this many of its own sizes from the origin has 7 left.
+FARTHEST = 1e9
+# Beyond these a length squared leaves the range of float64 numbers that keep all their digits.
+LARGEST, SMALLEST = 1e100, 1e-100
+
+
+def _named(indices: Array, limit: int = 5) -> str:
+    """The first few indices, for a message."""
+    head = ", ".join(str(int(i)) for i in indices[:limit])
+    return head + (", ..." if len(indices) > limit else "")
+
+
+def _checked_vertices(value: Any, name: str) -> FloatArray:
+    try:
+        vertices = np.array(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{name} vertices: expected numbers of shape (v, 3), got {error}") from error
+    if vertices.ndim != 2 or vertices.shape[1] != 3:
+        raise ValueError(f"{name} vertices: expected shape (v, 3), got {vertices.shape}")
+    finite = np.isfinite(vertices).all(axis=1)
+    if not finite.all():
+        bad = np.flatnonzero(~finite)
+        raise ValueError(
+            f"{name} vertices: expected finite numbers, got NaN or infinity in {len(bad)} "
+            f"of {len(vertices)} (vertices {_named(bad)})"
+        )
+    return vertices
+
+
+def _checked_faces(value: Any, count: int, name: str) -> npt.NDArray[np.int64]:
+    try:
+        raw = np.asarray(value)
+    except ValueError as error:
+        raise ValueError(f"{name} faces: expected shape (f, 3), got {error}") from error
+    if raw.size == 0:
+        raise ValueError(f"{name} faces: expected at least one triangle, got none")
+    if raw.ndim != 2 or raw.shape[1] != 3:
+        raise ValueError(f"{name} faces: expected shape (f, 3), got {raw.shape}")
+    if not np.issubdtype(raw.dtype, np.integer):
+        raise ValueError(f"{name} faces: expected integers, got {raw.dtype}")
+    bad = np.flatnonzero((raw < 0).any(axis=1) | (raw >= count).any(axis=1))
+    if len(bad):
+        raise ValueError(
+            f"{name} faces: expected vertex indices from 0 to {count - 1}, got others in "
+            f"{len(bad)} of {len(raw)} (faces {_named(bad)})"
+        )
+    return np.array(raw, dtype=np.int64)
+
+
+def _checked_extent(corners: FloatArray, name: str) -> float:
+    """Longest side of the box around the corners, once it is known to be measurable."""
+    with np.errstate(over="ignore"):
+        extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    if not (extent < LARGEST and (extent == 0.0 or extent > SMALLEST)):
+        raise ValueError(f"{name}: expected a size from {SMALLEST:g} to {LARGEST:g} m, got {extent:g} m")
+    return extent
+
+
+def _check_shape(vertices: FloatArray, faces: npt.NDArray[np.int64], name: str) -> None:
+    """Refuse faces without area, and meshes too far off for float64 to resolve."""
+    corners = vertices[faces]
+    extent = _checked_extent(corners, name)
+    farthest = np.abs(corners).max()
+    sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
+    longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
+    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    bad = np.flatnonzero(~(doubled > DEGENERATE * longest**2))
+    if len(bad):
+        raise ValueError(
+            f"{name} faces: expected triangles with an area, got {len(bad)} of {len(faces)} "
+            f"without (faces {_named(bad)}); drop them, or give Mesh.cleaned(...)"
+        )
+    if farthest > FARTHEST * extent:
+        raise ValueError(
+            f"{name}: expected a mesh within {FARTHEST:g} of its own sizes from the origin, got "
+            f"{farthest / extent:.3g} sizes; move the scene nearer"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles in space.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64, metres
+    faces : (f, 3) int64
+        Vertex indices, counter-clockwise seen from the front.
+    name : str
+        For messages.
+
+    Raises
+    ------
+    ValueError
+        For vertices that are not finite, no faces, indices out of range, faces without area.
+    """
+
+    vertices: FloatArray
+    faces: npt.NDArray[np.int64]
+    name: str = "mesh"
+
+    def __post_init__(self) -> None:
+        vertices = _checked_vertices(self.vertices, self.name)
+        faces = _checked_faces(self.faces, len(vertices), self.name)
+        _check_shape(vertices, faces, self.name)
+        vertices.flags.writeable = False
+        faces.flags.writeable = False
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "faces", faces)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # numpy forgets on the way through a pickle that the arrays are not to be written
+        return Mesh, (self.vertices, self.faces, self.name)
+
+    @staticmethod
+    def cleaned(vertices: npt.ArrayLike, faces: npt.ArrayLike, name: str = "mesh") -> Mesh:
+        """A mesh without the faces that have no area.
+
+        Parameters
+        ----------
+        vertices : (v, 3) array-like, metres
+        faces : (f, 3) array-like of int
+        name : str
+
+        Returns
+        -------
+        Mesh
+        """
+        points = _checked_vertices(vertices, name)
+        triangles = _checked_faces(faces, len(points), name)
+        corners = points[triangles]
+        extent = _checked_extent(corners, name)
+        sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
+        doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+        return Mesh(points, triangles[doubled > DEGENERATE * (sides**2).sum(axis=2).max(axis=1)], name)
+
+    @property
+    def bounds(self) -> FloatArray:
+        """(2, 3) float64, metres: lower and upper corner of what the faces span."""
+        corners = self.vertices[self.faces].reshape(-1, 3)
+        return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Mesh:
+        """The mesh turned about the origin, then shifted.
+
+        Parameters
+        ----------
+        offset : (3,) array-like, metres
+        turn : (3, 3) array-like, optional
+            Rotation matrix, applied to column vectors; see `fringetrace.vectors.rotation`.
+
+        Returns
+        -------
+        Mesh
+
+        Raises
+        ------
+        ValueError
+            If `offset` is no vector or `turn` no rotation.
+        """
+        turned = self.vertices if turn is None else self.vertices @ checked_rotation(turn, "turn").T
+        return Mesh(turned + checked_vector(offset, "offset"), self.faces, self.name)
+
+
+def as_mesh(value: Any, name: str = "mesh") -> Mesh:
+    """A Mesh from anything with `vertices` and `faces`, such as trimesh.Trimesh (in metres).
+
+    Parameters
+    ----------
+    value : Mesh, trimesh.Trimesh, or alike
+    name : str
+
+    Returns
+    -------
+    Mesh
+
+    Raises
+    ------
+    TypeError
+        If the value has no vertices and faces.
+    """
+    if isinstance(value, Mesh):
+        return value
+    if not (hasattr(value, "vertices") and hasattr(value, "faces")):
+        raise TypeError(
+            f"{name}: expected a mesh with vertices and faces, got {type(value).__name__}; "
+            "files are read by fringetrace.meshes.load"
+        )
+    return Mesh(value.vertices, value.faces, name)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A mesh and what it does to light.
+
+    Parameters
+    ----------
+    mesh : Mesh, trimesh.Trimesh, or alike, metres
+    interface : Interface
+        `Mirror`, `Absorber`, `BeamSplitter`.
+    name : str
+
+    Raises
+    ------
+    TypeError
+        If `mesh` is no mesh or `interface` no interface.
+    """
+
+    mesh: Mesh
+    interface: Interface
+    name: str = "surface"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mesh", as_mesh(self.mesh, self.name))
+        branches = all(hasattr(self.interface, name) for name in ("reflection", "transmission"))
+        if isinstance(self.interface, type) or not branches:
+            raise TypeError(f"{self.name} interface: expected one such as Mirror(), got {self.interface!r}")
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """Gaussian beam profile, brightest at the centre: amplitude exp(-r^2 / waist^2).
+
+    Parameters
+    ----------
+    waist : float, metres
+        Radius at which the amplitude is 1/e of the centre's.
+
+    Raises
+    ------
+    ValueError
+        If the waist is not a positive length.
+    """
+
+    waist: float
+
+    def __post_init__(self) -> None:
+        _positive(self.waist, "Gaussian waist")
+
+    def __call__(self, x: FloatArray, y: FloatArray) -> FloatArray:
+        """Amplitude at beam coordinates x, y (metres), each (n,) float64."""
+        return np.asarray(np.exp(-(x * x + y * y) / self.waist**2), dtype=np.float64)
+
+
+Profile = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+def _positive(value: float, what: str) -> float:
+    if not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
+        raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
+    return float(value)
+
+
+def _checked_size(size: Any, what: str) -> tuple[float, float]:
+    sides = tuple(size) if isinstance(size, Iterable) else (size,)
+    if len(sides) != 2:
+        raise ValueError(f"{what} size: expected (width, height) in metres, got {size!r}")
+    return _positive(sides[0], f"{what} width"), _positive(sides[1], f"{what} height")
+
+
+def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Names of surfaces, given as one or as several.
+
+    Parameters
+    ----------
+    names : str or iterable of str
+
+    Returns
+    -------
+    tuple of str
+    """
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _checked_grid(shape: Any, what: str) -> tuple[int, int]:
+    grid = tuple(shape) if isinstance(shape, Iterable) else (shape,)
+    if len(grid) != 2 or not all(isinstance(n, (int, np.integer)) and n > 0 for n in grid):
+        raise ValueError(f"{what}: expected two positive whole numbers (rows, columns), got {shape!r}")
+    return int(grid[0]), int(grid[1])
+
+
+@dataclass(frozen=True, eq=False)
+class Beam:
+    """A collimated coherent beam: a plane wave, launched as a grid of parallel rays.
+
+    Parameters
+    ----------
+    centre : (3,) metres
+        Centre of the rectangle it starts from; the phase is 0 on that rectangle.
+    direction : (3,)
+    up : (3,)
+        Direction of the rows of its ray grid.
+    size : (width, height), metres
+    shape : (rows, columns)
+        Rays start at the centres of the cells of this grid.
+    profile : callable, optional
+        Amplitude at beam coordinates (x, y) in metres; None is uniform, 1 everywhere.
+    passes : names of surfaces that the rays pass over on their first leg.
+
+    Raises
+    ------
+    ValueError
+        For a direction of length 0, an `up` along it, sizes or shapes that are not positive.
+    TypeError
+        If the profile is no function.
+    """
+
+    centre: FloatArray
+    direction: FloatArray
+    up: FloatArray
+    size: tuple[float, float]
+    shape: tuple[int, int]
+    profile: Profile | None = None
+    passes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", checked_vector(self.centre, "Beam centre"))
+        object.__setattr__(self, "direction", checked_direction(self.direction, "Beam direction"))
+        object.__setattr__(self, "up", checked_direction(self.up, "Beam up"))
+        frame(self.direction, self.up, "Beam")
+        object.__setattr__(self, "size", _checked_size(self.size, "Beam"))
+        object.__setattr__(self, "shape", _checked_grid(self.shape, "Beam shape"))
+        if self.profile is not None and not callable(self.profile):
+            raise TypeError(f"Beam profile: expected None or a function of (x, y), got {self.profile!r}")
+        object.__setattr__(self, "passes", as_names(self.passes))
+
+    @property
+    def area(self) -> float:
+        """Area of the beam that one ray stands for, m^2."""
+        return self.size[0] * self.size[1] / (self.shape[0] * self.shape[1])
+
+
+@dataclass(frozen=True, eq=False)
+class CCD:
+    """A rectangle of pixels that records what falls on its front.
+
+    Images are arrays [row, column] = [v, u], origin lower: u = normal x up is to the right of
+    somebody who looks out of the chip along its normal, v is up. Light from behind passes.
+
+    Parameters
+    ----------
+    centre : (3,) metres
+    normal : (3,)
+        Points to where the light comes from.
+    up : (3,)
+        Direction of increasing row.
+    pitch : float, metres
+        Side of the square pixels.
+    shape : (rows, columns)
+    focus : float, metres
+        Distance in front of the chip of the plane that an ideal 1:1 relay images onto it;
+        field positions and optical paths are those in that plane. 0: the bare chip.
+
+    Raises
+    ------
+    ValueError
+        For a normal of length 0, an `up` along it, a pitch or shape that is not positive.
+    """
+
+    centre: FloatArray
+    normal: FloatArray
+    up: FloatArray
+    pitch: float
+    shape: tuple[int, int]
+    focus: float = 0.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", checked_vector(self.centre, "CCD centre"))
+        object.__setattr__(self, "normal", checked_direction(self.normal, "CCD normal"))
+        object.__setattr__(self, "up", checked_direction(self.up, "CCD up"))
+        frame(self.normal, self.up, "CCD")
+        object.__setattr__(self, "pitch", _positive(self.pitch, "CCD pitch"))
+        object.__setattr__(self, "shape", _checked_grid(self.shape, "CCD shape"))
+        if not (isinstance(self.focus, Real) and np.isfinite(self.focus)):
+            raise ValueError(f"CCD focus: expected a length in metres, got {self.focus!r}")
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height, metres."""
+        return self.shape[1] * self.pitch, self.shape[0] * self.pitch
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Surfaces that light meets.
+
+    Parameters
+    ----------
+    surfaces : iterable of Surface
+
+    Raises
+    ------
+    TypeError
+        If one of them is not a Surface.
+    ValueError
+        If there are none.
+    """
+
+    surfaces: tuple[Surface, ...]
+    # what rooms above have derived from the surfaces (the engine's bodies), kept with them
+    derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        surfaces = tuple(self.surfaces) if isinstance(self.surfaces, Iterable) else (self.surfaces,)
+        for surface in surfaces:
+            if not isinstance(surface, Surface):
+                raise TypeError(f"Scene: expected Surface, got {type(surface).__name__}")
+        if not surfaces:
+            raise ValueError("Scene: expected at least one Surface, got none")
+        object.__setattr__(self, "surfaces", surfaces)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"surfaces": self.surfaces, "derived": {}}
+
+    def index(self, name: str) -> int:
+        """Position of the surface called `name`.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ValueError
+            If no surface, or more than one, is called so.
+        """
+        names = [surface.name for surface in self.surfaces]
+        if names.count(name) != 1:
+            raise ValueError(
+                f"Scene: expected one surface called {name!r}, got {names.count(name)} in {names}"
+            )
+        return names.index(name)
