@@ -19,7 +19,7 @@ from fringetrace.trace import stream, trace
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
-    from fringetrace import instruments, meshes, phase, views
+    from fringetrace import instruments, meshes, phase, shapes, views
 
 __version__ = _version("fringetrace")
 
@@ -44,6 +44,7 @@ __all__ = [
     "mm",
     "nm",
     "phase",
+    "shapes",
     "stream",
     "trace",
     "um",
@@ -51,7 +52,7 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("instruments", "meshes", "phase", "views")
+_ROOMS = ("instruments", "meshes", "phase", "shapes", "views")
 
 
 def __getattr__(name: str) -> Any:

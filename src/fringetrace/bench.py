@@ -204,9 +204,7 @@ class Bench:
         -------
         (rows, columns) float64, radians, not wrapped
         """
-        rows, columns = self.ccd.shape
-        x = (np.arange(columns) + 0.5 - 0.5 * columns) * self.ccd.pitch
-        y = (np.arange(rows) + 0.5 - 0.5 * rows) * self.ccd.pitch
+        x, y = pixel_centres(self.ccd.shape, self.ccd.pitch)
         slope_x, slope_y = path_slope(self.tilt)
         path = slope_x * x[None, :] + slope_y * y[:, None]
         return np.asarray(wavenumber(wavelength) * path, dtype=np.float64)
@@ -264,3 +262,20 @@ def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:
     angle = math.hypot(*tilt)
     scale = math.sin(2.0 * angle) / angle if angle > 0.0 else 2.0
     return scale * tilt[0], scale * tilt[1]
+
+
+def pixel_centres(shape: tuple[int, int], pitch: float) -> tuple[FloatArray, FloatArray]:
+    """Positions of pixels about the centre of their image.
+
+    Parameters
+    ----------
+    shape : (rows, columns)
+    pitch : float, metres
+
+    Returns
+    -------
+    x : (columns,) float64, metres
+    y : (rows,) float64, metres
+    """
+    y, x = ((np.arange(n, dtype=np.float64) + 0.5 - 0.5 * n) * pitch for n in shape)
+    return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)

@@ -20,8 +20,9 @@ from fringetrace.vectors import frame
 from fringetrace.waves import Array, FloatArray
 
 if TYPE_CHECKING:
-    from pyvista import Plotter, PolyData
+    from pyvista import PolyData
 
+Plotter = Any  # mypy does not see through the decorators of pyvista's
 UNITS: tuple[tuple[str, float], ...] = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9), ("pm", 1e-12))
 # Okabe and Ito's colours, told apart with any colour vision; the last one is for all the rest.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C8C8C")
@@ -206,7 +207,7 @@ def _draw_names(plotter: Plotter, places: Sequence[tuple[str, FloatArray]], metr
     middle = 0.5 * ((everything @ up).min() + (everything @ up).max())
     for name, points in places:
         side = 1.0 if (points @ up).mean() > middle + gap else -1.0
-        spot = points[np.argmax(side * (points @ up))] + gap * (side * up + right)
+        spot = points[np.argmax(side * (points @ up))] + gap * (side * up + 2.0 * right)
         plotter.add_point_labels(
             spot[None, :] / metres, [name], font_size=22, text_color="black", shape=None, show_points=False,
             always_visible=True, justification_horizontal="left",

@@ -76,6 +76,15 @@ class Body:
         """The float64 tree that decides doubtful hits."""
         return _tree(self.vertices[self.faces], self.frame[6])
 
+    @cached_property
+    def packed(self) -> tuple[Any, ...]:
+        """The body as the kernels take it."""
+        tree = self.tree
+        return (
+            self.first, self.stop, self.oriented, self.closed, self.frame, self.planes,
+            tree.corners, tree.order, tree.lower, tree.upper,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
 class Engine:
@@ -91,16 +100,23 @@ class Engine:
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """What each row of a batch met last: path (metres), triangle (-1: nothing), point, normal, rim."""
+    """What each row of a batch met last, and what Embree is asked (float32).
+
+    `path` in metres, `triangle` (-1: nothing), `point`, its `facet` normal, distance from its `rim`.
+    """
 
     path: FloatArray
     triangle: IntArray
     point: FloatArray
     facet: FloatArray
     rim: FloatArray
+    origin32: npt.NDArray[np.float32]
+    direction32: npt.NDArray[np.float32]
+    sent: IntArray
+    asked: IntArray
 
     @staticmethod
-    def empty(rows: int) -> Hits:
+    def blank(rows: int) -> Hits:
         """Room for so many rows."""
         return Hits(
             path=np.empty(rows),
@@ -108,6 +124,10 @@ class Hits:
             point=np.empty((rows, 3)),
             facet=np.empty((rows, 3)),
             rim=np.empty(rows),
+            origin32=np.empty((rows, 3), dtype=np.float32),
+            direction32=np.empty((rows, 3), dtype=np.float32),
+            sent=np.empty(rows, dtype=np.int64),
+            asked=np.empty(rows, dtype=np.int64),
         )
 
 
@@ -223,7 +243,9 @@ def _groups(surfaces: tuple[Surface, ...], alone: frozenset[int]) -> list[tuple[
             if groups[g][0] in alone:
                 continue
             smallest = min(size, (members[:, 1] - members[:, 0]).max(axis=1).min())
-            extent = np.maximum(members[:, 1].max(axis=0), box[1]) - np.minimum(members[:, 0].min(axis=0), box[0])
+            extent = np.maximum(members[:, 1].max(axis=0), box[1]) - np.minimum(
+                members[:, 0].min(axis=0), box[0]
+            )
             overlap = ((members[:, 0] <= wide[1]) & (members[:, 1] >= wide[0])).all(axis=1)
             if extent.max() <= SPREAD * smallest and not overlap.any():
                 home = g
@@ -268,19 +290,17 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
     return engine
 
 
-def find(
-    engine: Engine, batch: Batch, active: IntArray, hits: Hits, passed: frozenset[int] = frozenset()
-) -> int:
-    """Nearest hit of each active ray, written into `hits`.
+def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:
+    """Nearest hit of each ray, written into `hits`.
 
     Parameters
     ----------
     engine : Engine
     batch : Batch
-    active : (n,) int64
-        Rows of the batch to be followed.
+    rows : int
+        How many rays it holds.
     hits : Hits
-        Rows as in `batch`.
+        At least as many rows.
     passed : set of surface numbers
         Surfaces to be passed over; each must have a body of its own.
 
@@ -291,38 +311,33 @@ def find(
     """
     from fringetrace import kernels
 
-    n = len(active)
-    origin32, direction32 = np.empty((n, 3), np.float32), np.empty((n, 3), np.float32)
-    sent, asked = np.empty(n, np.int64), np.empty(n, np.int64)
+    origin32, direction32 = hits.origin32, hits.direction32
     doubtful = 0
     fresh = True
     for body in engine.bodies:
         if passed.issuperset(body.surfaces):
             continue
         count = kernels.aim(
-            active, n, batch.origin, batch.direction, batch.last, batch.normal, body.frame,
-            body.first, body.stop, hits.path, hits.triangle, fresh, origin32, direction32, sent,
+            rows, batch.origin, batch.direction, batch.last, batch.normal, body.frame, body.first, body.stop,
+            hits.path, hits.triangle, fresh, origin32, direction32, hits.sent,
         )  # fmt: skip
         fresh = False
         if count == 0:
             continue
         prim = body.embree.run(origin32[:count], direction32[:count])
         found = kernels.suspect(
-            sent, count, prim, batch.direction, batch.last, body.first, body.stop, body.closed,
-            body.planes, origin32, direction32, asked,
+            hits.sent, count, prim, batch.direction, batch.last, body.first, body.stop, body.closed,
+            body.frame[4], body.planes, origin32, direction32, hits.asked,
         )  # fmt: skip
         if found:
             second = body.embree.run(origin32[:found], direction32[:found])
-            rows = asked[:found]
-            prim[rows[second != prim[rows]]] = -2
-        tree = body.tree
+            rows_asked = hits.asked[:found]
+            prim[rows_asked[second != prim[rows_asked]]] = -2
         doubtful += kernels.measure(
-            sent, count, prim, batch.origin, batch.direction, batch.last, batch.normal, batch.edge,
-            batch.straight, body.frame, body.first, body.stop, body.oriented, body.closed,
-            body.planes, tree.corners, tree.order, tree.lower, tree.upper,
-            hits.path, hits.triangle, hits.point, hits.facet, hits.rim,
+            hits.sent, count, prim, batch.origin, batch.direction, batch.last, batch.normal, batch.edge,
+            batch.straight, *body.packed, hits.path, hits.triangle, hits.point, hits.facet, hits.rim,
         )  # fmt: skip
     if fresh:
-        hits.triangle[active] = -1
-        hits.path[active] = np.inf
+        hits.path[:rows] = np.inf
+        hits.triangle[:rows] = -1
     return doubtful

@@ -17,13 +17,14 @@ from fringetrace.waves import FloatArray
 
 __all__ = ["Bench", "michelson"]
 
-# Parts of the arm: the splitter reaches SPAN up, down and to the sides; an arm is SHORTEST apertures
-# long or longer. A reference mirror tilted by up to TILT (radians) and moved by up to PISTON arms then
-# sends all of its light back through the splitter, and touches nothing.
+# Parts of the arm: the splitter reaches SPAN up, down and to the sides; an arm is SHORTEST apertures and
+# TALLEST heights of the sample long, or longer. A reference mirror tilted by up to TILT (radians) and
+# moved by up to PISTON arms then sends all of its light back through the splitter, and touches nothing.
 SPAN = 0.6
 SHORTEST = 2.0
+TALLEST = 3.0
 TILT = 0.1
-PISTON = 0.2
+PISTON = 0.1
 
 
 def michelson(
@@ -64,7 +65,8 @@ def michelson(
     profile : callable, optional
         Amplitude of the beam at (x, y) of the image, metres; None is uniform. See `Gaussian`.
     arm : float, metres, optional
-        Length of the arms; default twice the larger side of the aperture.
+        Length of the arms; default twice the larger side of the image, three times the height of
+        the sample if that is more.
     splitter, mirror : Interface
         Of the splitter and of the reference mirror.
     focus : bool
@@ -82,47 +84,52 @@ def michelson(
     TypeError
         If the sample is no mesh.
     """
-    size, arm = _layout(aperture, pixels, rays, arm)
-    _check_reference(reference_tilt, piston, arm)
     surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
-    _check_sample(surface, arm)
+    size, arm = _layout(aperture, pixels, rays, arm, float(surface.mesh.bounds[1, 2]))
+    _check_reference(reference_tilt, piston, arm)
     half, (rows, columns) = SPAN * arm, pixels
     crossing = plate(2.0 * half * math.sqrt(2.0), 2.0 * half)
     facing = plate(half, half).moved(turn=_reference_turn(reference_tilt))
+    x, y, z = np.eye(3)
     scene = Scene(
-        [
-            Surface(crossing.moved(turn=rotation((0.0, 1.0, 0.0), math.pi / 4.0)), splitter, "splitter"),
-            replace(surface, mesh=surface.mesh.moved((0.0, 0.0, -arm))),
-            Surface(facing.moved((arm + piston, 0.0, 0.0)), mirror, "reference"),
-        ]
+        (
+            Surface(crossing.moved(turn=rotation(y, math.pi / 4.0)), splitter, "splitter"),
+            replace(surface, mesh=surface.mesh.moved(-arm * z)),
+            Surface(facing.moved((arm + piston) * x), mirror, "reference"),
+        )
     )
     beam = Beam(
-        centre=(-arm, 0.0, 0.0), direction=(1.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), size=size,
-        shape=(rows * rays, columns * rays), profile=None if profile is None else partial(_seen, profile),
+        centre=-arm * x, direction=x, up=y, size=size, shape=(rows * rays, columns * rays),
+        profile=None if profile is None else partial(_seen, profile),
     )  # fmt: skip
     ccd = CCD(
-        centre=(0.0, 0.0, arm), normal=(0.0, 0.0, -1.0), up=(0.0, 1.0, 0.0), pitch=aperture / columns,
-        shape=(rows, columns), focus=2.0 * arm if focus else 0.0,
+        centre=arm * z, normal=-z, up=y, pitch=aperture / columns, shape=(rows, columns),
+        focus=2.0 * arm if focus else 0.0,
     )  # fmt: skip
     return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt)
 
 
 def _layout(
-    aperture: float, pixels: tuple[int, int], rays: int, arm: float | None
+    aperture: float, pixels: tuple[int, int], rays: int, arm: float | None, top: float
 ) -> tuple[tuple[float, float], float]:
     """Width and height of the beam and the length of the arms, once they are known to fit."""
     if not (math.isfinite(aperture) and aperture > 0.0):
         raise ValueError(f"michelson aperture: expected a positive length in metres, got {aperture!r}")
-    if len(pixels) != 2 or not all(isinstance(n, int) and n > 0 for n in pixels):
+    if len(pixels) != 2 or not all(isinstance(n, (int, np.integer)) and n > 0 for n in pixels):
         raise ValueError(f"michelson pixels: expected positive whole (rows, columns), got {pixels!r}")
-    if not isinstance(rays, int) or rays < 1:
+    if not isinstance(rays, (int, np.integer)) or rays < 1:
         raise ValueError(f"michelson rays: expected a positive whole number, got {rays!r}")
     size = (aperture, aperture * pixels[0] / pixels[1])
-    arm = 2.0 * max(size) if arm is None else arm
+    arm = max(SHORTEST * max(size), TALLEST * top) if arm is None else arm
     if not (math.isfinite(arm) and arm >= SHORTEST * max(size)):
         raise ValueError(
             f"michelson arm: expected at least {SHORTEST} times the aperture, {SHORTEST * max(size):g} m, "
             f"got {arm!r}"
+        )
+    if not arm >= TALLEST * top:
+        raise ValueError(
+            f"michelson arm: expected at least {TALLEST} times the sample's height, {TALLEST * top:g} m, "
+            f"got {arm!r}; z = 0 is the plane that the camera sees"
         )
     return size, arm
 
@@ -134,16 +141,6 @@ def _check_reference(tilt: tuple[float, float], piston: float, arm: float) -> No
     if not abs(piston) <= PISTON * arm:
         raise ValueError(
             f"michelson piston: expected up to {PISTON} times the arm, {PISTON * arm:g} m, got {piston!r}"
-        )
-
-
-def _check_sample(sample: Surface, arm: float) -> None:
-    """Refuse a sample that would touch the splitter."""
-    top, room = float(sample.mesh.bounds[1, 2]), (1.0 - SPAN) * arm
-    if not top < room:
-        raise ValueError(
-            f"michelson sample: expected heights under {room:g} m, where the splitter begins, got {top:g} m; "
-            "give a longer arm, or move the sample so that z = 0 is the plane to be seen"
         )
 
 

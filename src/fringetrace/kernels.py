@@ -13,11 +13,14 @@ import numpy as np
 from numba import njit
 
 jit: Any = njit(nogil=True, cache=True, error_model="numpy")
+part: Any = njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 
 # float32 resolves 2**-24 of the unit box; eight such steps separate a restart from its surface.
 SHIFT = 2.0**-20
 # Nearer than this to an edge, or to the start, float32 does not decide.
 MARGIN = 8.0 * SHIFT
+# A ray leaving flatter than this (cosine to the normal) grazes.
+GRAZING = 0.125
 # On a body that the ray has not just left, Embree starts this far behind the ray.
 BEHIND = 2.0**-18
 # The second opinion on a suspicious answer comes from this far aside.
@@ -42,8 +45,7 @@ def launch(first, rows, columns, centre, u, v, direction, width, height, start, 
 
 @jit
 def aim(
-    active, total, origin, direction, last, normal, frame, first, stop, path, triangle, fresh, origin32,
-    direction32, sent,
+    total, origin, direction, last, normal, frame, first, stop, path, triangle, fresh, origin32, direction32, sent
 ):  # fmt: skip
     """Collect, in float32 and the unit box of a body, the rays that can meet it; return how many.
 
@@ -52,64 +54,66 @@ def aim(
     """
     cx, cy, cz, scale, radius = frame[0], frame[1], frame[2], frame[3], frame[4]
     count = 0
-    for i in range(total):
-        row = np.uintp(active[i])
+    for row in range(total):
         if fresh:
             path[row], triangle[row] = np.inf, -1
         dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
         x = (origin[row, 0] - cx) * scale
         y = (origin[row, 1] - cy) * scale
         z = (origin[row, 2] - cz) * scale
-        along = x * dx + y * dy + z * dz
-        qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
-        square = radius * radius - (qx * qx + qy * qy + qz * qz)
-        if square < 0.0:
-            continue
-        reach = np.sqrt(square)
-        if along > reach:
-            continue
         if first <= last[row] < stop:
             # along the ray: aside, it would pass silhouettes on the wrong side; a grazing one
             # takes the rest along the normal
             nx, ny, nz = normal[row, 0], normal[row, 1], normal[row, 2]
             leaving = nx * dx + ny * dy + nz * dz
-            step = SHIFT / max(abs(leaving), 0.125)
-            side = (SHIFT if leaving > 0.0 else -SHIFT) - step * leaving
-            x += step * dx + side * nx
-            y += step * dy + side * ny
-            z += step * dz + side * nz
+            if abs(leaving) > GRAZING:
+                step = SHIFT / abs(leaving)
+                x, y, z = x + step * dx, y + step * dy, z + step * dz
+            else:
+                step = SHIFT / GRAZING
+                side = (SHIFT if leaving > 0.0 else -SHIFT) - step * leaving
+                x, y, z = x + step * dx + side * nx, y + step * dy + side * ny, z + step * dz + side * nz
         else:
+            along = x * dx + y * dy + z * dz
+            qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
+            square = radius * radius - (qx * qx + qy * qy + qz * qz)
+            if square < 0.0:
+                continue
+            reach = np.sqrt(square)
+            if along > reach:
+                continue
             step = -along - reach if along < -reach else -BEHIND
-            x += step * dx
-            y += step * dy
-            z += step * dz
+            x, y, z = x + step * dx, y + step * dy, z + step * dz
         origin32[count, 0], origin32[count, 1], origin32[count, 2] = x, y, z
         direction32[count, 0], direction32[count, 1], direction32[count, 2] = dx, dy, dz
-        sent[count] = active[i]
+        sent[count] = row
         count += 1
     return count
 
 
 @jit
-def suspect(sent, count, prim, direction, last, first, stop, closed, planes, origin32, direction32, asked):
+def suspect(
+    sent, count, prim, direction, last, first, stop, closed, radius, planes, origin32, direction32, asked
+):  # fmt: skip
     """Move to the front, a little aside, the rays whose answer wants a second opinion.
 
-    These are misses of an open body, and first hits on the inside of a closed one: Embree has
-    holes at exact vertices.
+    Embree has holes at exact vertices. Suspicious are misses of an open body, and, of rays that
+    have not just left it, misses of a closed body from within its bounding sphere and hits on
+    its inside.
     """
     found = 0
+    inner = (1.0 - 1e-4) * radius * radius
     for i in range(count):
         row = np.uintp(sent[i])
         tri = prim[i]
         if closed:
-            if tri < 0 or first <= last[row] < stop:
+            if first <= last[row] < stop:
                 continue
-            facing = (
-                planes[tri, 0] * direction[row, 0]
-                + planes[tri, 1] * direction[row, 1]
-                + planes[tri, 2] * direction[row, 2]
-            )
-            if facing <= 0.0:
+            dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
+            if tri >= 0:
+                if planes[tri, 0] * dx + planes[tri, 1] * dy + planes[tri, 2] * dz <= 0.0:
+                    continue
+            elif origin32[i, 0] ** 2 + origin32[i, 1] ** 2 + origin32[i, 2] ** 2 >= inner:
                 continue
         elif tri >= 0:
             continue
@@ -183,7 +187,9 @@ def arrange(lower, upper, middle, leaves):
         cheapest, axis = np.inf, 0
         for k in range(3):
             select(order, middle[k], start, stop, start + half)
-            cost = girth(order, lower, upper, start, start + half) + girth(order, lower, upper, start + half, stop)
+            cost = girth(order, lower, upper, start, start + half) + girth(
+                order, lower, upper, start + half, stop
+            )
             if cost < cheapest:
                 cheapest, axis = cost, k
         if axis != 2:
@@ -193,7 +199,7 @@ def arrange(lower, upper, middle, leaves):
     return order
 
 
-@jit
+@part
 def permute(x, y, z, axis):
     """Coordinates with `axis` last (cyclic)."""
     if axis == 0:
@@ -223,7 +229,7 @@ def crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
     return u + v + w != 0.0
 
 
-@jit
+@part
 def inset(planes, tri, x, y, z):
     """Distance inside the nearest edge of a triangle; negative outside."""
     a = planes[tri, 4] * x + planes[tri, 5] * y + planes[tri, 6] * z + planes[tri, 7]
@@ -233,9 +239,11 @@ def inset(planes, tri, x, y, z):
     return least if least < c else c
 
 
-@jit
+@part
 def enters(lower, upper, node, x, y, z, ix, iy, iz, nearest):
     """Path at which a ray enters a box, or infinity if it does not before `nearest`."""
+    if lower[node, 0] > upper[node, 0]:  # an empty one
+        return np.inf
     ax, bx = (lower[node, 0] - x) * ix, (upper[node, 0] - x) * ix
     ay, by = (lower[node, 1] - y) * iy, (upper[node, 1] - y) * iy
     az, bz = (lower[node, 2] - z) * iz, (upper[node, 2] - z) * iz
@@ -245,7 +253,7 @@ def enters(lower, upper, node, x, y, z, ix, iy, iz, nearest):
     return begin if begin <= end and end >= -1e-9 and begin <= nearest else np.inf
 
 
-@jit
+@part
 def inverse(component):
     """1 / component, finite: a slab that a ray runs along is entered nowhere or everywhere."""
     return 1.0 / component if abs(component) > 1e-200 else 1e200
@@ -253,9 +261,9 @@ def inverse(component):
 
 @jit
 def decide(
-    x, y, z, dx, dy, dz, skip, guess, side, bx, by, bz, planes, corners, order, lower, upper, tolerance
+    x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper, tolerance
 ):  # fmt: skip
-    """First hit of a ray in float64 alone, by a bounding volume tree; (inf, -1) if none.
+    """First hit of a ray in float64 alone, by a bounding volume tree; triangle -1 if none before `limit`.
 
     `skip` is the triangle just left, `guess` one that is likely hit (or below 0). A face that
     the start touches is hit at 0 if the ray goes on through it: seen from the region it travels
@@ -267,7 +275,7 @@ def decide(
     px, py, pz = permute(dx, dy, dz, axis)
     shear_x, shear_y = px / pz, py / pz
     ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
-    nearest, best = np.inf, -1
+    nearest, best = limit, -1
     leaves = len(lower) // 2
     stack = np.empty(64, np.int64)
     stack[0] = 1
@@ -322,9 +330,11 @@ def decide(
 
 
 @jit
-def doubted(x, y, z, dx, dy, dz, row, own, guess, last, first, normal, straight, leaving, oriented, frame,
-            planes, corners, order, lower, upper):  # fmt: skip
-    """Exact hit of a doubtful ray: its path and triangle, and a point put back inside its edges."""
+def doubted(
+    x, y, z, dx, dy, dz, row, own, guess, limit, leaving, last, normal, straight, first, oriented, frame,
+    planes, corners, order, lower, upper,
+):  # fmt: skip
+    """Exact hit of a doubtful ray before `limit`: path, triangle, a point inside its edges."""
     radius, tolerance = frame[4], frame[6]
     along = x * dx + y * dy + z * dz
     start = 0.0
@@ -346,8 +356,9 @@ def doubted(x, y, z, dx, dy, dz, row, own, guess, last, first, normal, straight,
             by -= 2.0 * leaving * normal[row, 1]
             bz -= 2.0 * leaving * normal[row, 2]
     path, tri = decide(
-        x, y, z, dx, dy, dz, skip, guess, side, bx, by, bz, planes, corners, order, lower, upper, tolerance
-    )
+        x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
+        tolerance,
+    )  # fmt: skip
     inside = np.inf
     if tri >= 0:
         x, y, z = x + path * dx, y + path * dy, z + path * dz
@@ -362,51 +373,60 @@ def doubted(x, y, z, dx, dy, dz, row, own, guess, last, first, normal, straight,
 
 @jit
 def measure(
-    sent, count, prim, origin, direction, last, normal, edge, straight, frame, first, stop, oriented, closed,
+    sent, count, prim, origin, direction, last, normal, edge, straight, first, stop, oriented, closed, frame,
     planes, corners, order, lower, upper, path, triangle, point, facet, rim,
 ):  # fmt: skip
     """Turn Embree's triangle numbers into float64 hits; decide the doubtful ones exactly.
 
     Keeps a hit where it is nearer than `path` (metres). Returns how many were doubtful.
     """
-    cx, cy, cz, scale, restart = frame[0], frame[1], frame[2], frame[3], frame[5]
+    # one long loop: numba counts references of every array that a function inside it takes
+    cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
     unscale = 1.0 / scale
     doubtful = 0
     for i in range(count):
         row = np.uintp(sent[i])
+        guess = np.int64(prim[i])
+        left = last[row]
+        own = first <= left < stop
+        if guess == -1 and not own:
+            continue
         dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
         x = (origin[row, 0] - cx) * scale
         y = (origin[row, 1] - cy) * scale
         z = (origin[row, 2] - cz) * scale
-        left = last[row]
-        own = first <= left < stop
         leaving = normal[row, 0] * dx + normal[row, 1] * dy + normal[row, 2] * dz
-        guess = np.int64(prim[i])
         distance, px, py, pz, inside = np.inf, x, y, z, 0.0
         if guess >= 0:
-            tri = np.uintp(guess)
-            facing = planes[tri, 0] * dx + planes[tri, 1] * dy + planes[tri, 2] * dz
-            height = planes[tri, 0] * x + planes[tri, 1] * y + planes[tri, 2] * z + planes[tri, 3]
+            k = np.uintp(guess)
+            facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
+            height = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3]
             distance = -height / facing
             px, py, pz = x + distance * dx, y + distance * dy, z + distance * dz
-            inside = inset(planes, tri, px, py, pz)
+            inside = inset(planes, k, px, py, pz)
             doubt = not (inside > MARGIN and distance > MARGIN and distance < 1e300)
-            doubt |= own and (edge[row] < restart or guess == left - first)
-            doubt |= own and oriented and facing * leaving >= 0.0
+            doubt |= own and (guess == left - first or (oriented and facing * leaving >= 0.0))
         else:
-            doubt = guess == -2 or (own and (edge[row] < restart or (closed and leaving < 0.0)))
-        if doubt:
+            doubt = guess == -2 or (own and closed and leaving < 0.0)
+        near = own and edge[row] < frame[5]
+        if doubt or near:
+            # near an edge the step off the surface may have jumped something; beyond it Embree is
+            # right, if the step went along the ray
             doubtful += 1
-            distance, guess, px, py, pz, inside = doubted(
-                x, y, z, dx, dy, dz, row, own, guess, last, first, normal, straight, leaving, oriented,
-                frame, planes, corners, order, lower, upper,
+            local = not doubt and abs(leaving) > GRAZING
+            exact, tri, ex, ey, ez, rest = doubted(
+                x, y, z, dx, dy, dz, row, own, np.int64(-1) if local else guess,
+                2.0 * MARGIN if local else np.inf, leaving, last, normal, straight, first, oriented, frame,
+                planes, corners, order, lower, upper,
             )  # fmt: skip
+            if tri >= 0 or not local:
+                distance, guess, px, py, pz, inside = exact, tri, ex, ey, ez, rest
         if guess < 0 or not distance * unscale < path[row]:
             continue
-        tri = np.uintp(guess)
         # rounding left the point a little off its plane: put it back
-        nx, ny, nz = planes[tri, 0], planes[tri, 1], planes[tri, 2]
-        height = nx * px + ny * py + nz * pz + planes[tri, 3]
+        k = np.uintp(guess)
+        nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
+        height = nx * px + ny * py + nz * pz + planes[k, 3]
         path[row] = distance * unscale
         triangle[row] = first + guess
         point[row, 0] = cx + (px - height * nx) * unscale
@@ -417,106 +437,140 @@ def measure(
     return doubtful
 
 
-@jit
-def land(screen, row, path, origin, direction, length, fate):
-    """End a ray on the CCD if it reaches its front before `path` metres; say whether it did."""
-    dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
-    x, y, z = origin[row, 0] - screen[0], origin[row, 1] - screen[1], origin[row, 2] - screen[2]
+@part
+def lands(screen, path, x, y, z, dx, dy, dz):
+    """Path to the CCD if a ray reaches its front within `path` metres, else infinity."""
+    x, y, z = x - screen[0], y - screen[1], z - screen[2]
     facing = dx * screen[3] + dy * screen[4] + dz * screen[5]
-    if not facing < 0.0:
-        return False
     reach = -(x * screen[3] + y * screen[4] + z * screen[5]) / facing
-    if not (reach > 0.0 and reach < path):
-        return False
+    if not (facing < 0.0 and reach > 0.0 and reach < path):
+        return np.inf
     reach += screen[14] / facing  # back along the ray to the plane in focus
     u = (x + reach * dx) * screen[6] + (y + reach * dy) * screen[7] + (z + reach * dz) * screen[8]
     v = (x + reach * dx) * screen[9] + (y + reach * dy) * screen[10] + (z + reach * dz) * screen[11]
-    if not (-screen[12] <= u < screen[12] and -screen[13] <= v < screen[13]):
-        return False
-    origin[row, 0] += reach * dx
-    origin[row, 1] += reach * dy
-    origin[row, 2] += reach * dz
-    length[row] += reach
-    fate[row] = DETECTED
-    return True
+    inside = -screen[12] <= u < screen[12] and -screen[13] <= v < screen[13]
+    return reach if inside else np.inf
 
 
 @jit
 def interact(
-    active, count, rows, origin, direction, length, amplitude, bounces, reflections, key, fate, ray, last,
-    normal, edge, straight, lost, parent, path, triangle, point, facet, rim, owner, reflection, transmission,
-    plain, screen, has_screen, max_bounces, faint,
+    count, origin, direction, normal, length, edge, lost, amplitude, key, ray, last, bounces, reflections,
+    straight, serial, path, triangle, point, facet, rim, owner, reflection, transmission, plain, screen,
+    has_screen, max_bounces, faint, end_origin, end_direction, end_length, end_lost, end_amplitude, end_key,
+    end_ray, end_bounces, end_reflections, end_fate, end_serial, ended, first, serials,
 ):  # fmt: skip
-    """Send each active ray through what it met; return how many go on (kept in `active`) and all rows.
+    """Send each ray through what it met; write down those that end, close up the rest.
 
-    A ray that splits goes on as its reflected branch; the transmitted one gets a new row. In a
-    `plain` scene all surfaces reflect with -1: amplitudes are left alone.
+    A ray that splits goes on as its reflected branch; transmitted ones follow behind all rows.
+    Ends go to row `ray - first`, or, if `first` is negative, one after the other from `ended` on.
+    In a `plain` scene all surfaces reflect with -1: amplitudes follow from bounces. Returns how many
+    rays go on, how many of them are new, how many have ended, and the next serial number.
     """
     base = np.uint64(2 * len(reflection) + 1)
-    kept, top = 0, rows
-    for i in range(count):
-        row = np.uintp(active[i])
-        if has_screen and land(screen, row, path[row], origin, direction, length, fate):
-            continue
-        if triangle[row] < 0:
-            fate[row] = LEFT
-            continue
-        if bounces[row] >= max_bounces:
-            fate[row] = TRUNCATED
-            continue
-        surface = owner[np.uintp(triangle[row])]
-        nx, ny, nz = facet[row, 0], facet[row, 1], facet[row, 2]
+    kept, born = 0, 0
+    for row in range(count):
+        x, y, z = origin[row, 0], origin[row, 1], origin[row, 2]
         dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
-        origin[row, 0], origin[row, 1], origin[row, 2] = point[row, 0], point[row, 1], point[row, 2]
-        normal[row, 0], normal[row, 1], normal[row, 2] = nx, ny, nz
-        last[row], edge[row] = triangle[row], rim[row]
-        length[row] += path[row]
-        bounces[row] += 1
-        stem = key[row] * base + np.uint64(2 * surface + 1)
-        reflects = True
+        way, here, steps = length[row], key[row], bounces[row]
+        before, gone, mirrored = 1.0 + 0.0j, 0.0, steps
         if not plain:
-            r, t = reflection[surface], transmission[surface]
-            r2, t2 = r.real * r.real + r.imag * r.imag, t.real * t.real + t.imag * t.imag
-            before = amplitude[row]
-            power = before.real * before.real + before.imag * before.imag
-            lost[row] += power * (1.0 - r2 - t2)
-            reflects = r2 > 0.0
-            if t2 > 0.0:
-                branch = row
-                if reflects:
-                    branch = np.uintp(top)
-                    top += 1
-                    origin[branch, 0], origin[branch, 1], origin[branch, 2] = point[row, 0], point[row, 1], point[row, 2]
-                    direction[branch, 0], direction[branch, 1], direction[branch, 2] = dx, dy, dz
-                    normal[branch, 0], normal[branch, 1], normal[branch, 2] = nx, ny, nz
-                    last[branch], edge[branch], length[branch] = last[row], edge[row], length[row]
-                    bounces[branch], reflections[branch] = bounces[row], reflections[row]
-                    ray[branch], parent[branch], lost[branch] = ray[row], active[i], 0.0
-                key[branch] = stem + np.uint64(1)
-                amplitude[branch] = before * t
-                straight[branch] = True
-                fate[branch] = ALIVE if power * t2 >= faint else FAINT
-            elif not reflects:
-                key[row] = stem
-                amplitude[row] = 0.0
-                fate[row] = ABSORBED
-                continue
-            if reflects:
-                amplitude[row] = before * r
-                fate[row] = ALIVE if power * r2 >= faint else FAINT
-                reflections[row] += 1 if t2 == 0.0 else 0
-        if reflects:
-            key[row] = stem
-            straight[row] = False
+            before, gone, mirrored = amplitude[row], lost[row], reflections[row]
+        fate = ALIVE
+        through = False
+        reach = np.inf
+        if has_screen:
+            reach = lands(screen, path[row], x, y, z, dx, dy, dz)
+        if reach < np.inf:
+            x, y, z = x + reach * dx, y + reach * dy, z + reach * dz
+            way += reach
+            fate = DETECTED
+        elif triangle[row] < 0:
+            fate = LEFT
+        elif steps >= max_bounces:
+            fate = TRUNCATED
+        else:
+            surface = owner[np.uintp(triangle[row])]
+            x, y, z = point[row, 0], point[row, 1], point[row, 2]
+            nx, ny, nz = facet[row, 0], facet[row, 1], facet[row, 2]
+            way += path[row]
+            steps += 1
+            here = here * base + np.uint64(2 * surface + 1)
             along = 2.0 * (nx * dx + ny * dy + nz * dz)
-            dx, dy, dz = dx - along * nx, dy - along * ny, dz - along * nz
+            rx, ry, rz = dx - along * nx, dy - along * ny, dz - along * nz
             # one Newton step keeps the length at 1 over thousands of bounces
-            scale = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
-            direction[row, 0], direction[row, 1], direction[row, 2] = dx * scale, dy * scale, dz * scale
-        if fate[row] == ALIVE:
-            active[kept] = active[i]
-            kept += 1
-    return kept, top
+            scale = 1.5 - 0.5 * (rx * rx + ry * ry + rz * rz)
+            rx, ry, rz = rx * scale, ry * scale, rz * scale
+            if not plain:
+                r, t = reflection[surface], transmission[surface]
+                r2, t2 = r.real * r.real + r.imag * r.imag, t.real * t.real + t.imag * t.imag
+                power = before.real * before.real + before.imag * before.imag
+                gone += power * (1.0 - r2 - t2)
+                if r2 > 0.0 and t2 > 0.0:
+                    new = count + born
+                    born += 1
+                    origin[new, 0], origin[new, 1], origin[new, 2] = x, y, z
+                    direction[new, 0], direction[new, 1], direction[new, 2] = dx, dy, dz
+                    normal[new, 0], normal[new, 1], normal[new, 2] = nx, ny, nz
+                    length[new], edge[new], lost[new] = way, rim[row], 0.0
+                    amplitude[new], key[new], ray[new] = before * t, here + np.uint64(1), ray[row]
+                    last[new], bounces[new], reflections[new] = triangle[row], steps, mirrored
+                    straight[new], serial[new] = True, serials
+                    serials += 1
+                    # too faint to be followed: ends here, as a row of its own
+                    if power * t2 < faint:
+                        born -= 1
+                        end_origin[ended, 0], end_origin[ended, 1], end_origin[ended, 2] = x, y, z
+                        end_direction[ended, 0], end_direction[ended, 1] = dx, dy
+                        end_direction[ended, 2] = dz
+                        end_length[ended], end_lost[ended], end_amplitude[ended] = way, 0.0, before * t
+                        end_key[ended], end_ray[ended] = here + np.uint64(1), ray[row]
+                        end_bounces[ended], end_reflections[ended] = steps, mirrored
+                        end_fate[ended], end_serial[ended] = FAINT, serials - 1
+                        ended += 1
+                if r2 > 0.0:
+                    before = before * r
+                    mirrored += 1 if t2 == 0.0 else 0
+                    power *= r2
+                elif t2 > 0.0:
+                    before = before * t
+                    rx, ry, rz = dx, dy, dz
+                    here += np.uint64(1)
+                    through = True
+                    power *= t2
+                else:
+                    before = 0.0j
+                    rx, ry, rz = dx, dy, dz
+                    fate = ABSORBED
+                if fate == ALIVE and power < faint:
+                    fate = FAINT
+            dx, dy, dz = rx, ry, rz
+            if fate == ALIVE:
+                origin[kept, 0], origin[kept, 1], origin[kept, 2] = x, y, z
+                direction[kept, 0], direction[kept, 1], direction[kept, 2] = dx, dy, dz
+                normal[kept, 0], normal[kept, 1], normal[kept, 2] = nx, ny, nz
+                length[kept], edge[kept], last[kept] = way, rim[row], triangle[row]
+                key[kept], ray[kept], bounces[kept], serial[kept] = here, ray[row], steps, serial[row]
+                if not plain:
+                    lost[kept], amplitude[kept] = gone, before
+                    reflections[kept], straight[kept] = mirrored, through
+                kept += 1
+                continue
+        end = ray[row] - first if first >= 0 else ended
+        end_origin[end, 0], end_origin[end, 1], end_origin[end, 2] = x, y, z
+        end_direction[end, 0], end_direction[end, 1], end_direction[end, 2] = dx, dy, dz
+        end_length[end], end_key[end], end_ray[end] = way, here, ray[row]
+        end_bounces[end], end_fate[end], end_serial[end] = steps, fate, serial[row]
+        if not plain:
+            end_lost[end], end_amplitude[end], end_reflections[end] = gone, before, mirrored
+        ended += 1
+    for i in range(born):  # kept <= count: in order, nothing is overwritten before it is read
+        new, to = count + i, kept + i
+        for k in range(3):
+            origin[to, k], direction[to, k], normal[to, k] = origin[new, k], direction[new, k], normal[new, k]
+        length[to], edge[to], lost[to], amplitude[to] = length[new], edge[new], lost[new], amplitude[new]
+        key[to], ray[to], last[to], bounces[to] = key[new], ray[new], last[new], bounces[new]
+        reflections[to], straight[to], serial[to] = reflections[new], straight[new], serial[new]
+    return kept + born, born, ended, serials
 
 
 @jit

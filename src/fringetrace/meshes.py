@@ -1,4 +1,4 @@
-"""Meshes and height maps in files: load, save, read; and the height of a mesh above points.
+"""Meshes and height maps in files: load, save, read; the height above points; and the built shapes.
 
 Meshes are `fringetrace.scene.Mesh`, in metres. Height maps are arrays [row, column] with origin
 lower: column counts along x, row along y, heights along z, seen from +z.
@@ -16,9 +16,37 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.scene import Mesh
-from fringetrace.shapes import checked_length, height_map
+from fringetrace.shapes import (
+    checked_length,
+    corner_cube,
+    extrude,
+    height_map,
+    icosphere,
+    plate,
+    rod_lattice,
+    rod_of_triangle,
+    staircase,
+    step,
+)
 from fringetrace.triangles import IndexArray, height_above, weld
 from fringetrace.waves import FloatArray, unit_length
+
+__all__ = [
+    "corner_cube",
+    "elevation_sample",
+    "extrude",
+    "height_map",
+    "icosphere",
+    "interpolate_height",
+    "load",
+    "plate",
+    "read_height_map",
+    "rod_lattice",
+    "rod_of_triangle",
+    "save",
+    "staircase",
+    "step",
+]
 
 WRITTEN = (".glb", ".obj", ".ply", ".stl")
 METROPRO = ".dat"
@@ -35,8 +63,8 @@ def _existing(path: str | os.PathLike[str]) -> Path:
 def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
     """Mesh from a file: STL, PLY, OBJ, GLB, and whatever else trimesh can read; or Zygo MetroPro `.dat`.
 
-    Vertices with equal coordinates are welded and faces without area dropped; faces keep their
-    order. A file of several parts becomes one mesh, each part where the file puts it.
+    Vertices with equal coordinates are welded and faces without area dropped. A file of several
+    parts becomes one mesh, each part where the file puts it; the faces of a part keep their order.
 
     Parameters
     ----------
@@ -84,10 +112,10 @@ def _parsed(file: Path) -> tuple[FloatArray, IndexArray]:
         _refuse_relative(file)
     try:
         with warnings.catch_warnings():
-            # numpy before 2.3 only warns, and leaves out the rest of the numbers
+            # older numpy only warns, and leaves out the rest of the numbers
             warnings.filterwarnings("error", message="string or file could not be read")
-            scene = trimesh.load_scene(file, process=False, skip_materials=True, maintain_order=True)
-    except Exception as error:  # parsers of ten formats raise all kinds
+            scene = trimesh.load_scene(file, process=False, skip_materials=True)
+    except Exception as error:  # each parser raises kinds of its own
         kind = file.suffix[1:].upper()
         raise ValueError(
             f"{file}: expected {kind} data, got something that does not parse: {error}"
@@ -97,7 +125,8 @@ def _parsed(file: Path) -> tuple[FloatArray, IndexArray]:
         pose, name = scene.graph[node]
         part = scene.geometry[name]
         if isinstance(part, trimesh.Trimesh):
-            vertices.append(np.asarray(part.vertices) @ pose[:3, :3].T + pose[:3, 3])
+            with np.errstate(invalid="ignore"):  # infinite vertices are refused later, by name
+                vertices.append(np.asarray(part.vertices) @ pose[:3, :3].T + pose[:3, 3])
             turned = np.linalg.det(pose[:3, :3]) < 0.0  # a mirrored part shows its back
             faces.append(np.asarray(part.faces)[:, :: -1 if turned else 1] + count)
             count += len(part.vertices)

@@ -44,7 +44,7 @@ def _checked_frames(frames: npt.ArrayLike, what: str, count: int | None = None) 
         raise ValueError(
             f"{what} frames: expected {expected} along the first axis, got {found} (shape {values.shape})"
         )
-    return values
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 def _angle(sine: FloatArray, cosine: FloatArray, frames: FloatArray, gain: float = FIXED_GAIN) -> FloatArray:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from numbers import Real
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -106,7 +107,9 @@ class Rays:
         Rays
             Views of the same arrays.
         """
-        columns = {name: getattr(self, name)[start:stop] for name in ("origin", "direction", "length", "amplitude")}
+        columns = {
+            name: getattr(self, name)[start:stop] for name in ("origin", "direction", "length", "amplitude")
+        }
         return _trusted(**columns, area=self.area, passes=self.passes)
 
 
@@ -167,11 +170,11 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Rays under way: one row a path, changed in place by the bounce passes.
+    """Rays under way, one row each, changed in place by the bounce passes. Lengths in metres.
 
-    Lengths in metres. `last` is the triangle last left (-1: none), `normal` and `edge` its normal
-    and the distance of the start from its nearest edge (unit box); `straight` says that the ray
-    went through it. `lost` is the power given off on the way, `parent` the row a row split from.
+    `last` is the triangle last left (-1: none), `normal` and `edge` its normal and the distance of
+    the start from its nearest edge (unit box); `straight` says that the ray went through it.
+    `lost` is the power given off on the way, `serial` numbers the paths as they are born.
     """
 
     origin: FloatArray
@@ -183,70 +186,80 @@ class Batch:
     amplitude: ComplexArray
     key: npt.NDArray[np.uint64]
     ray: npt.NDArray[np.int64]
-    parent: npt.NDArray[np.int64]
     last: npt.NDArray[np.int64]
     bounces: npt.NDArray[np.int32]
     reflections: npt.NDArray[np.int32]
-    fate: npt.NDArray[np.int8]
     straight: npt.NDArray[np.bool_]
-
-    def grown(self, capacity: int) -> Batch:
-        """The same rows in arrays with room for `capacity` of them."""
-        return Batch(**{name: _enlarged(column, capacity) for name, column in vars(self).items()})
-
-    def part(self, start: int, stop: int) -> Batch:
-        """Views of some rows."""
-        return Batch(**{name: column[start:stop] for name, column in vars(self).items()})
+    serial: npt.NDArray[np.int64]
 
 
-def _enlarged(column: Array, capacity: int) -> Array:
-    larger = np.empty((capacity, *column.shape[1:]), dtype=column.dtype)
-    larger[: len(column)] = column
-    return larger
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Paths that have ended, one row each; columns as in `Batch`, and the reason."""
+
+    origin: FloatArray
+    direction: FloatArray
+    length: FloatArray
+    lost: FloatArray
+    amplitude: ComplexArray
+    key: npt.NDArray[np.uint64]
+    ray: npt.NDArray[np.int64]
+    bounces: npt.NDArray[np.int32]
+    reflections: npt.NDArray[np.int32]
+    fate: npt.NDArray[np.int8]
+    serial: npt.NDArray[np.int64]
 
 
-def blank(rows: int) -> Batch:
-    """Room for a batch of so many rows, not filled in."""
-    return Batch(
-        origin=np.empty((rows, 3)),
-        direction=np.empty((rows, 3)),
-        normal=np.empty((rows, 3)),
-        length=np.empty(rows),
-        edge=np.empty(rows),
-        lost=np.empty(rows),
-        amplitude=np.empty(rows, dtype=np.complex128),
-        key=np.empty(rows, dtype=np.uint64),
-        ray=np.empty(rows, dtype=np.int64),
-        parent=np.empty(rows, dtype=np.int64),
-        last=np.empty(rows, dtype=np.int64),
-        bounces=np.empty(rows, dtype=np.int32),
-        reflections=np.empty(rows, dtype=np.int32),
-        fate=np.empty(rows, dtype=np.int8),
-        straight=np.empty(rows, dtype=np.bool_),
+Table = TypeVar("Table", Batch, Ends)
+TYPES = {
+    "amplitude": np.complex128, "key": np.uint64, "ray": np.int64, "last": np.int64, "serial": np.int64,
+    "bounces": np.int32, "reflections": np.int32, "fate": np.int8, "straight": np.bool_,
+}  # fmt: skip
+
+
+def blank(kind: type[Table], rows: int) -> Table:
+    """Room for so many rows, not filled in."""
+    wide = ("origin", "direction", "normal")
+    return kind(
+        **{
+            column.name: np.empty((rows, 3) if column.name in wide else rows, TYPES.get(column.name, np.float64))
+            for column in fields(kind)
+        }
     )
 
 
-def start(state: Batch, rays: Rays, first: int, alive: int) -> None:
-    """Fill a batch with rays at their start.
+def part(table: Table, start: int, stop: int) -> Table:
+    """Views of some rows."""
+    return type(table)(**{name: column[start:stop] for name, column in vars(table).items()})
+
+
+def grown(table: Table, rows: int) -> Table:
+    """The same rows in arrays with room for more."""
+    larger = blank(type(table), rows)
+    for name, column in vars(table).items():
+        getattr(larger, name)[: len(column)] = column
+    return larger
+
+
+def start(state: Batch, rays: Rays, first: int) -> None:
+    """Fill the head of a batch with rays at their start.
 
     Parameters
     ----------
     state : Batch
-        As many rows as there are rays.
+        At least as many rows as there are rays.
     rays : Rays
     first : int
         Number of the first of them.
-    alive : int
-        The fate code of rays that go on.
     """
-    state.origin[:] = rays.origin
-    state.direction[:] = rays.direction
-    state.length[:] = rays.length
-    state.amplitude[:] = 1.0  # of the path alone: the launched amplitude is multiplied in at the end
-    state.ray[:] = np.arange(first, first + len(rays))
-    state.last[:] = -1
-    state.fate[:] = alive
-    for column in (state.normal, state.edge, state.lost, state.key, state.parent, state.bounces):
-        column[:] = 0
-    state.reflections[:] = 0
-    state.straight[:] = False
+    n = len(rays)
+    state.origin[:n] = rays.origin
+    state.direction[:n] = rays.direction
+    state.length[:n] = rays.length
+    state.amplitude[:n] = 1.0  # of the path alone: the launched amplitude is multiplied in at the end
+    state.ray[:n] = np.arange(first, first + n)
+    state.serial[:n] = np.arange(n)
+    state.last[:n] = -1
+    for column in (state.normal, state.edge, state.lost, state.key, state.bounces, state.reflections):
+        column[:n] = 0
+    state.straight[:n] = False

@@ -6,15 +6,16 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 import numpy as np
 
 from fringetrace.engine import Engine, Hits, build, find
 from fringetrace.paths import Fate, Paths, join, pixels
-from fringetrace.rays import Batch, Rays, blank, launch, start
+from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray
@@ -108,123 +109,141 @@ def _plan(
 
 
 class _Record:
-    """Surfaces, triangles and points of a chunk, one column for each pass."""
+    """Triangles and points of the paths of a chunk, by serial number: one column for each pass."""
 
     def __init__(self, start: FloatArray) -> None:
-        self.points = [start]
+        self.points = [start.copy()]
         self.triangles: list[Array] = []
 
-    def add(self, state: Batch, before: Array, rows: int) -> None:
-        """Append a pass: each row that met something since had `before` bounces; new rows inherit."""
-        old = len(before)
-        new = np.arange(old, rows)
-        parent = state.parent[old:rows]
-        self.points = [np.concatenate([column, column[parent]]) for column in self.points]
-        self.triangles = [np.concatenate([column, column[parent]]) for column in self.triangles]
-        met = np.flatnonzero(state.bounces[:old] > before)
-        met = np.concatenate([met, new])
-        triangle, point = np.full(rows, -1, dtype=np.int64), np.full((rows, 3), np.nan)
-        triangle[met] = state.last[met]
-        # where the ray is now, and not at the CCD: rows that landed met nothing in this pass
-        point[met] = state.origin[met]
-        self.triangles.append(triangle)
-        self.points.append(point)
+    def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
+        """Append a pass: paths born in it inherit, those named by `serials` met a triangle."""
+        self.points = [np.concatenate([column, column[parents]]) for column in self.points]
+        self.triangles = [np.concatenate([column, column[parents]]) for column in self.triangles]
+        total = len(self.points[0])
+        met, where = np.full(total, -1, dtype=np.int64), np.full((total, 3), np.nan)
+        met[serials], where[serials] = triangle, point
+        self.triangles.append(met)
+        self.points.append(where)
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
-    """What is known of a chunk beside its batch."""
+class Chunk:
+    """A chunk of rays whose paths have all ended, as many as `rows`."""
 
+    ends: Ends
+    rows: int
     rays: Rays
     segments: int
     doubtful: int
     record: _Record | None
 
 
-def _advance(plan: Plan, state: Batch, first: int, stop: int) -> tuple[Batch, Ends]:
-    """Follow the rays from `first` up to `stop` to all their ends, in the rows of a batch.
+@dataclass(eq=False)
+class Workspace:
+    """Arrays that a thread keeps from chunk to chunk."""
 
-    Returns the batch (a larger one, if rays split) and what else is known of the chunk.
-    """
+    state: Batch
+    hits: Hits
+
+    @staticmethod
+    def blank(rows: int) -> Workspace:
+        """Room for so many rays under way."""
+        return Workspace(blank(Batch, rows), Hits.blank(rows))
+
+
+def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, old: int, hits: Hits) -> None:
+    """Write down a pass: every path that met something, on its way or at its end."""
+    count = len(before["serial"])
+    met = (hits.triangle[:count] >= 0) & (before["bounces"] < plan.max_bounces)
+    landed = ends.serial[old:][ends.fate[old:] == Fate.DETECTED]
+    met &= ~np.isin(before["serial"], landed)
+    splits = abs(plan.reflection) * abs(plan.transmission) > 0.0
+    parents = np.flatnonzero(met)
+    parents = parents[splits[plan.engine.owner[hits.triangle[parents]]]]
+    first = len(record.points[0])
+    serials = np.concatenate([before["serial"][met], np.arange(first, first + len(parents))])
+    rows = np.concatenate([np.flatnonzero(met), parents])
+    record.add(before["serial"][parents], serials, hits.triangle[rows], hits.point[rows])
+
+
+def _advance(plan: Plan, space: Workspace, ends: Ends, first: int, stop: int) -> Chunk:
+    """Follow the rays from `first` up to `stop` to all their ends."""
     from fringetrace import kernels
 
     rays = plan.rays(first, stop)
-    start(state, rays, first, kernels.ALIVE)
-    hits = Hits.empty(len(rays))
-    record = _Record(state.origin.copy()) if plan.record else None
-    rows, count, segments, doubtful = len(rays), len(rays), 0, 0
-    active = np.arange(rows)
+    if len(space.state.ray) < len(rays):
+        space.state, space.hits = blank(Batch, len(rays)), Hits.blank(len(rays))
+    start(space.state, rays, first)
+    record = _Record(rays.origin) if plan.record else None
+    ordered = not (plan.splits or plan.record)
+    count, ended, serials, segments, doubtful = len(rays), 0, len(rays), 0, 0
     passed = plan.passed
     while count:
-        if plan.splits and rows + count > len(state.ray):
-            capacity = 2 * (rows + count)
-            state, hits = state.grown(capacity), Hits.empty(capacity)
+        if plan.splits and 2 * count > len(space.state.ray):
+            space.state, space.hits = grown(space.state, 4 * count), Hits.blank(4 * count)
+        if not ordered and ended + 2 * count > len(ends.ray):
+            ends = grown(ends, 2 * (ended + 2 * count))
+        state, hits = space.state, space.hits
         segments += count
-        doubtful += find(plan.engine, state, active[:count], hits, passed)
+        doubtful += find(plan.engine, state, count, hits, passed)
         passed = frozenset()
-        before = state.bounces[:rows].copy() if record else None
-        kept, top = kernels.interact(
-            active, count, rows, state.origin, state.direction, state.length, state.amplitude, state.bounces,
-            state.reflections, state.key, state.fate, state.ray, state.last, state.normal, state.edge,
-            state.straight, state.lost, state.parent, hits.path, hits.triangle, hits.point, hits.facet,
-            hits.rim, plan.engine.owner, plan.reflection, plan.transmission, plan.plain, plan.screen,
-            plan.ccd is not None, plan.max_bounces, plan.faint,
+        before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()} if record else {}
+        old = ended
+        count, _, ended, serials = kernels.interact(
+            count, *vars(state).values(), hits.path, hits.triangle, hits.point, hits.facet, hits.rim,
+            plan.engine.owner, plan.reflection, plan.transmission, plan.plain, plan.screen,
+            plan.ccd is not None, plan.max_bounces, plan.faint, *vars(ends).values(), ended,
+            first if ordered else -1, serials,
         )  # fmt: skip
-        if record is not None and before is not None:
-            record.add(state, before, top)
-        if top > rows:
-            born = np.arange(rows, top)
-            active = np.concatenate([active[:kept], born[state.fate[rows:top] == kernels.ALIVE]])
-            kept = len(active)
-        rows, count = top, kept
-    return state.part(0, rows), Ends(rays, segments, doubtful, record)
+        if record is not None:
+            _noted(record, plan, before, part(ends, 0, ended), old, hits)
+    return Chunk(ends, ended, rays, segments, doubtful, record)
 
 
-def _recorded(plan: Plan, record: _Record, state: Batch, order: Array | slice) -> dict[str, Array]:
+def _recorded(plan: Plan, record: _Record, ends: Ends) -> dict[str, Array]:
     """The record as the padded tables of `Paths`."""
-    none = np.empty((len(state.ray), 0), dtype=np.int64)
-    hits = np.stack(record.triangles, axis=1)[order] if record.triangles else none
-    depth = int(state.bounces.max(initial=0))
-    triangle = hits[:, :depth]
+    depth = int(ends.bounces.max(initial=0))
+    triangle = np.stack([*record.triangles, record.triangles[0]], axis=1)[ends.serial, :depth]
     surface = np.where(triangle >= 0, plan.engine.owner[triangle], -1).astype(np.int64)
-    points = np.full((len(hits), depth + 2, 3), np.nan)
-    points[:, : depth + 1] = np.stack(record.points[: depth + 1], axis=1)[order]
-    ends = np.flatnonzero(state.fate[order] == Fate.DETECTED)
-    points[ends, state.bounces[order][ends] + 1] = state.origin[order][ends]
+    points = np.full((len(triangle), depth + 2, 3), np.nan)
+    points[:, : depth + 1] = np.stack(record.points[: depth + 1], axis=1)[ends.serial]
+    landed = np.flatnonzero(ends.fate == Fate.DETECTED)
+    points[landed, ends.bounces[landed] + 1] = ends.origin[landed]
     local = np.where(triangle >= 0, triangle - plan.engine.offset[surface], -1)
     return {"surface": surface, "triangle": local, "points": points}
 
 
 def _paths(
-    plan: Plan, state: Batch, first: int, launched: ComplexArray, segments: int, doubtful: int,
+    plan: Plan, ends: Ends, first: int, launched: ComplexArray, segments: int, doubtful: int,
     record: _Record | None = None,
 ) -> Paths:  # fmt: skip
-    """The table of a finished batch, sorted by ray; `launched` are the amplitudes from ray `first` on."""
-    order: Array | slice = slice(None)
-    if plan.splits:
-        # branches were made in an order that does not depend on the other rays: a stable sort keeps it
-        order = np.argsort(state.ray, kind="stable")
-    fate, origin, bounces = state.fate[order], state.origin[order], state.bounces[order]
-    amplitude, reflections = state.amplitude[order], state.reflections[order]
+    """The table of what has ended, sorted by ray; `launched` are the amplitudes from ray `first` on."""
+    if plan.splits or plan.record:
+        # a ray's ends come in an order that does not depend on other rays: a stable sort keeps it
+        order = np.argsort(ends.ray, kind="stable")
+        ends = Ends(**{name: column[order] for name, column in vars(ends).items()})
+    relative = launched[ends.ray - first] if len(ends.ray) > len(launched) else launched
     if plan.plain:
-        reflections = bounces
-        amplitude = 1.0 - 2.0 * (bounces % 2)
-    relative = launched[state.ray[order] - first]
-    pixel = np.full((len(fate), 2), np.nan)
+        reflections, lost = ends.bounces, np.zeros(len(ends.ray))
+        amplitude = relative * (1.0 - 2.0 * (ends.bounces % 2))
+    else:
+        reflections, lost = ends.reflections, ends.lost * np.abs(relative) ** 2
+        amplitude = relative * ends.amplitude
+    pixel = np.full((len(ends.ray), 2), np.nan)
     if plan.ccd is not None:
-        seen = np.flatnonzero(fate == Fate.DETECTED)
-        pixel[seen] = pixels(plan.ccd, origin[seen])
+        seen = np.flatnonzero(ends.fate == Fate.DETECTED)
+        pixel[seen] = pixels(plan.ccd, ends.origin[seen])
     return Paths(
-        ray=state.ray[order],
-        fate=fate,
-        bounces=bounces,
+        ray=ends.ray,
+        fate=ends.fate,
+        bounces=ends.bounces,
         reflections=reflections,
-        length=state.length[order],
-        origin=origin,
-        direction=state.direction[order],
-        amplitude=relative * amplitude,
-        lost=state.lost[order] * np.abs(relative) ** 2,
-        key=state.key[order],
+        length=ends.length,
+        origin=ends.origin,
+        direction=ends.direction,
+        amplitude=amplitude,
+        lost=lost,
+        key=ends.key,
         pixel=pixel,
         area=plan.source.area,
         incident=float((np.abs(launched) ** 2).sum()),
@@ -233,15 +252,8 @@ def _paths(
         scene=plan.scene,
         source=plan.source,
         ccd=plan.ccd,
-        **({} if record is None else _recorded(plan, record, state, order)),
+        **({} if record is None else _recorded(plan, record, ends)),
     )
-
-
-def _chunk(plan: Plan, first: int, stop: int) -> Paths:
-    """Paths of the rays from `first` up to `stop`."""
-    state, ends = _advance(plan, blank(stop - first), first, stop)
-    launched = np.asarray(ends.rays.amplitude)
-    return _paths(plan, state, first, launched, ends.segments, ends.doubtful, ends.record)
 
 
 def _pooled(
@@ -268,18 +280,52 @@ def _pooled(
                 future.cancel()
 
 
+class _Workspaces:
+    """One workspace for each thread, handed on from chunk to chunk."""
+
+    def __init__(self, rows: int) -> None:
+        self.rows = rows
+        self.idle: SimpleQueue[Workspace] = SimpleQueue()
+
+    @contextmanager
+    def one(self) -> Iterator[Workspace]:
+        """A workspace that nobody else has."""
+        try:
+            space = self.idle.get_nowait()
+        except Empty:
+            space = Workspace.blank(self.rows)
+        yield space
+        self.idle.put(space)
+
+
+def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress | None) -> Iterator[Paths]:
+    """Paths of consecutive rays."""
+    spaces = _Workspaces(min(chunk, plan.total))
+
+    def work(first: int, stop: int) -> Paths:
+        with spaces.one() as space:
+            done = _advance(plan, space, blank(Ends, stop - first), first, stop)
+        launched = np.asarray(done.rays.amplitude)
+        ends = part(done.ends, 0, done.rows)
+        return _paths(plan, ends, first, launched, done.segments, done.doubtful, done.record)
+
+    return _pooled(work, plan.total, threads, chunk, progress)
+
+
 def _at_once(plan: Plan, threads: int | None, chunk: int, progress: Progress | None) -> Paths:
     """All rays in one table from the start: where no ray splits, each has its row."""
-    state, launched = blank(plan.total), np.empty(plan.total, dtype=np.complex128)
+    spaces = _Workspaces(min(chunk, plan.total))
+    ends, launched = blank(Ends, plan.total), np.empty(plan.total, dtype=np.complex128)
 
     def work(first: int, stop: int) -> tuple[int, int]:
-        _, ends = _advance(plan, state.part(first, stop), first, stop)
-        launched[first:stop] = ends.rays.amplitude
-        return ends.segments, ends.doubtful
+        with spaces.one() as space:
+            done = _advance(plan, space, part(ends, first, stop), first, stop)
+        launched[first:stop] = done.rays.amplitude
+        return done.segments, done.doubtful
 
     counts = list(_pooled(work, plan.total, threads, chunk, progress))
     segments, doubtful = (sum(count) for count in zip(*counts, strict=True))
-    return _paths(plan, state, 0, launched, segments, doubtful)
+    return _paths(plan, ends, 0, launched, segments, doubtful)
 
 
 def stream(
@@ -308,7 +354,7 @@ def stream(
     """
     plan = _plan(scene, source, ccd, max_bounces, min_amplitude, record)
     workers = None if threads is None else _whole(threads, 1, "threads")
-    return _pooled(partial(_chunk, plan), plan.total, workers, _whole(chunk, 1, "chunk"), progress)
+    return _in_chunks(plan, workers, _whole(chunk, 1, "chunk"), progress)
 
 
 def trace(
@@ -360,4 +406,4 @@ def trace(
     size = _whole(chunk, 1, "chunk")
     if not (plan.splits or record):
         return _at_once(plan, workers, size, progress)
-    return join(list(_pooled(partial(_chunk, plan), plan.total, workers, size, progress)))
+    return join(list(_in_chunks(plan, workers, size, progress)))

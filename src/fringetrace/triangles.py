@@ -20,7 +20,7 @@ PAIRS = 1 << 17
 
 
 def weld(vertices: FloatArray, faces: IndexArray) -> tuple[FloatArray, IndexArray]:
-    """Join the vertices that are equal, bit for bit (0 and -0 alike).
+    """Join the vertices whose coordinates are exactly equal.
 
     Parameters
     ----------
@@ -34,17 +34,16 @@ def weld(vertices: FloatArray, faces: IndexArray) -> tuple[FloatArray, IndexArra
     faces : (f, 3) int64
         The same faces in the same order.
     """
-    points = vertices + 0.0  # turns -0 into 0
-    order = np.lexsort(points.T)
-    opens = np.ones(len(points), dtype=bool)
-    opens[1:] = (points[order[1:]] != points[order[:-1]]).any(axis=1)
+    order = np.lexsort(vertices.T)
+    opens = np.ones(len(vertices), dtype=bool)
+    opens[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
     first = order[opens]  # the sort is stable: the earliest of each group
     appearance = np.argsort(first)
     rank = np.empty_like(appearance)
     rank[appearance] = np.arange(len(first))
-    welded = np.empty(len(points), dtype=np.int64)
+    welded = np.empty(len(vertices), dtype=np.int64)
     welded[order] = rank[np.cumsum(opens) - 1]
-    return points[first[appearance]], welded[faces]
+    return vertices[first[appearance]], welded[faces]
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:

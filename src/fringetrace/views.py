@@ -28,7 +28,9 @@ def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
 
     rows, columns = shape
     height = float(np.clip(5.6 * rows / columns, 2.0, 9.0))
-    axes: Axes = Figure(figsize=(7.0, height), layout="constrained").add_subplot()
+    figure = Figure(figsize=(7.0, height))
+    figure.subplots_adjust(left=0.11, right=0.85, bottom=0.65 / height, top=1.0 - 0.4 / height)
+    axes: Axes = figure.add_subplot()
     return axes
 
 
@@ -47,7 +49,7 @@ def _scale_bar(ax: Axes, width: float, unit: str) -> None:
 
 
 def _image(
-    values: Array, pitch: float, ax: Axes | None, *, label: str, title: str | None, **style: Any
+    values: Array, pitch: float, ax: Axes | None, *, label: str, title: str | None, style: dict[str, Any]
 ) -> Axes:
     """An array [row, column] = [y, x], with its axes, scale bar and colour bar."""
     values = np.asarray(values)
@@ -67,8 +69,7 @@ def _image(
     if title:
         ax.set_title(title)
     _scale_bar(ax, width, unit)
-    bar = ax.get_figure(root=False).colorbar(image, ax=ax, label=label)  # type: ignore[union-attr]
-    bar.ax.set_label("colour bar")
+    ax.figure.colorbar(image, cax=ax.inset_axes((1.03, 0.0, 0.045, 1.0)), label=label)
     return ax
 
 
@@ -107,7 +108,12 @@ def interferogram(
         named = f"λ = {checked_wavelength(wavelength) * 1e9:g} nm"
         title = f"{title}, {named}" if title else named
     return _image(
-        image, pitch, ax, label="irradiance / incident irradiance", title=title, cmap="gray", vmin=0.0
+        image,
+        pitch,
+        ax,
+        label="irradiance / incident irradiance",
+        title=title,
+        style={"cmap": "gray", "vmin": 0.0},
     )
 
 
@@ -127,7 +133,7 @@ def height(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str 
     """
     span = np.nanmax(np.abs(map)) if np.isfinite(map).any() else 0.0
     unit, metres = unit_of(float(span))
-    return _image(map / metres, pitch, ax, label=f"height / {unit}", title=title, cmap="viridis")
+    return _image(map / metres, pitch, ax, label=f"height / {unit}", title=title, style={"cmap": "viridis"})
 
 
 def residual(
@@ -164,7 +170,7 @@ def residual(
         named += f" = {rms / checked_wavelength(wavelength):.2g} λ"
     return _image(
         map / metres, pitch, ax, label=f"residual / {unit}", title=f"{title}, {named}" if title else named,
-        cmap="PuOr", vmin=-limit, vmax=limit,
+        style={"cmap": "PuOr", "vmin": -limit, "vmax": limit},
     )  # fmt: skip
 
 
@@ -182,7 +188,8 @@ def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str |
     -------
     matplotlib Axes
     """
-    ax = _image(map, pitch, ax, label="phase / rad", title=title, cmap="twilight", vmin=-np.pi, vmax=np.pi)
+    style = {"cmap": "twilight", "vmin": -np.pi, "vmax": np.pi}
+    ax = _image(map, pitch, ax, label="phase / rad", title=title, style=style)
     bar = ax.images[0].colorbar
     if bar is not None:
         bar.set_ticks([-np.pi, 0.0, np.pi], labels=["−π", "0", "π"])
@@ -204,5 +211,6 @@ def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0)
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=target.parent) as folder:
         part = Path(folder, target.name)
-        figure.savefig(part, dpi=dpi)
+        lightly = {"pil_kwargs": {"compress_level": 1}} if part.suffix == ".png" else {}
+        figure.savefig(part, dpi=dpi, **lightly)
         os.replace(part, target)

@@ -1,0 +1,333 @@
+"""The command: a mesh file to interferogram, frames, height map, one labelled file, and pictures."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from cyclopts import App, CycloptsError, Parameter
+
+import fringetrace
+from fringetrace.drawing import unit_of
+from fringetrace.scene import Mesh
+from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from fringetrace.bench import Bench
+    from fringetrace.measurement import Measurement
+    from fringetrace.paths import Paths
+
+app = App(
+    name="fringetrace",
+    version=fringetrace.__version__,
+    help="Triangle meshes to full-field interferograms, with a phase you can trust.",
+)
+
+FRINGES = 10.0
+# The demo's relief and aperture: slopes that 512 pixels still resolve.
+RELIEF, APERTURE = 2e-6, 8e-3
+# Work that is done sooner needs no progress bar, seconds.
+PATIENCE = 1.0
+# Rays of the 3D picture along the longer side.
+DRAWN = 12
+FAILURE, INTERRUPTED = 2, 130
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Settings:
+    """What both commands take.
+
+    Parameters
+    ----------
+    wavelength
+        Vacuum wavelength, a number and a unit.
+    pixels
+        Pixels along the longer side of the image; the other side follows from the sample's shape.
+    rays
+        Rays a pixel along either axis: 2 traces four rays a pixel.
+    steps
+        Phase steps over one period, at least 3.
+    tilt
+        Tilt of the reference mirror along x, such as "200 urad". Default: ten fringes across.
+    threads
+        Default: one for each core.
+    picture
+        Draw the scene in 3D (scene.png); this needs OpenGL libraries.
+    """
+
+    wavelength: str = "632.8 nm"
+    pixels: int = 512
+    rays: int = 1
+    steps: int = 4
+    tilt: str | None = None
+    threads: int | None = None
+    picture: bool = True
+
+
+@app.command
+def interferogram(
+    mesh: Path,
+    /,
+    *,
+    unit: str | None = None,
+    out: Path | None = None,
+    aperture: str | None = None,
+    settings: Settings = Settings(),
+) -> None:
+    """Interferogram of a mesh (or a measured height map) in a Michelson interferometer.
+
+    The mesh lies with its heights along z, towards the light. Its lateral centre is moved onto
+    the optical axis and its highest point to z = 0, the plane that the camera is focused on.
+    Phase-stepped frames give the height map back, which is compared with the mesh.
+
+    Written to the folder OUT: interferogram.png, interferogram.tif and frames.tif (16 bits, as
+    a camera would), height.png (height, and its difference from the mesh), result.nc
+    (everything, labelled, NetCDF), scene.png (surfaces and rays).
+
+    Parameters
+    ----------
+    mesh
+        STL, PLY, OBJ or GLB file; or a Zygo MetroPro .dat height map.
+    unit
+        Unit of the numbers in the mesh file: nm, um, mm, m, ... A .dat file knows its own.
+    out
+        Folder to write to. Default: fringetrace-NAME, after the mesh, in this folder.
+    aperture
+        Longer side of the image, such as "8 mm". Default: that of the mesh.
+    """
+    from fringetrace import meshes
+
+    sample = meshes.load(mesh, unit=unit)
+    width = None if aperture is None else parse_length(aperture, "--aperture")
+    _run(sample, f"{mesh.name}", Path(f"fringetrace-{mesh.stem}") if out is None else out, width, settings)
+
+
+@app.command
+def demo(
+    *,
+    out: Path = Path("fringetrace-demo"),
+    settings: Settings = Settings(),
+) -> None:
+    """The whole way on matplotlib's sample elevation map, scaled down to a few wavelengths.
+
+    The map (Jacksboro fault, Tennessee; 840 m of relief over 30 km) becomes a mirror of 8 mm
+    with 2 um of relief. It is measured and written as by `fringetrace interferogram`.
+
+    Parameters
+    ----------
+    out
+        Folder to write to.
+    """
+    from fringetrace import meshes
+    from fringetrace.shapes import height_map
+
+    z, pitch = meshes.elevation_sample(RELIEF, APERTURE)
+    name = f"matplotlib's elevation map, {z.shape[0]} x {z.shape[1]}, relief scaled to {1e6 * RELIEF:g} um"
+    _run(height_map(z, pitch, name="elevation map"), name, out, None, settings)
+
+
+def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
+    """Trace, measure, write; say what was done."""
+    from rich.console import Console
+
+    from fringetrace import measurement
+
+    console = Console(highlight=False, soft_wrap=True)
+    wavelength = checked_wavelength(parse_length(settings.wavelength, "--wavelength"))
+    bench, centre = _bench(mesh, aperture, wavelength, settings)
+    with measurement.staged(out) as folder, ThreadPoolExecutor(2) as aside:
+        _say_bench(console, name, mesh, bench, wavelength)
+        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
+        scene = None
+        if settings.picture:
+            scene = aside.submit(_draw, bench, bench.sampled(_few(bench.beam.shape)), folder)
+        with _progress("tracing") as advance:
+            start = time.perf_counter()
+            bench.trace(progress=advance, threads=settings.threads)
+            seconds = time.perf_counter() - start
+        measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
+        _say_result(console, bench, measured, seconds)
+        measurement.write_camera(measured, folder)
+        measurement.write_pictures(measured, folder)
+        measurement.write_netcdf(measured, folder / "result.nc")
+        missing = None if scene is None else scene.result()
+        files = sorted(file.name for file in folder.iterdir())
+    if missing is not None:
+        _say(console, "no scene.png", missing)
+    _say(console, "written", f"{out}: {', '.join(files)}")
+
+
+def _bench(
+    mesh: Mesh, aperture: float | None, wavelength: float, settings: Settings
+) -> tuple[Bench, FloatArray]:
+    """The bench with the sample centred on its axis, and the point (3,) of the sample that is moved to 0."""
+    from fringetrace import instruments
+
+    if settings.steps < 3:
+        raise ValueError(f"--steps: expected at least 3, got {settings.steps}")
+    if settings.pixels < 1:
+        raise ValueError(f"--pixels: expected at least 1, got {settings.pixels}")
+    low, high = mesh.bounds
+    sides = (high - low)[1::-1]
+    if not sides.all():
+        raise ValueError(f"{mesh.name}: expected a surface across z, got {sides[1]:g} m x {sides[0]:g} m")
+    rows, columns = (max(1, round(settings.pixels * side / sides.max())) for side in sides)
+    width = (sides.max() if aperture is None else aperture) * columns / settings.pixels
+    tilt = min(FRINGES * wavelength / (2.0 * width), 0.5 * instruments.TILT)
+    if settings.tilt is not None:
+        tilt = parse_angle(settings.tilt, "--tilt")
+    top = np.array([*0.5 * (low + high)[:2], high[2]])
+    bench = instruments.michelson(
+        mesh.moved(-top),
+        aperture=width,
+        reference_tilt=(tilt, 0.0),
+        pixels=(rows, columns),
+        rays=settings.rays,
+    )
+    return bench, top
+
+
+def _few(shape: tuple[int, int]) -> tuple[int, int]:
+    """A grid of rays of the same proportions, few enough to look at."""
+    rows, columns = (max(1, round(DRAWN * n / max(shape))) for n in shape)
+    return rows, columns
+
+
+def _draw(bench: Bench, paths: Paths, folder: Path) -> str | None:
+    """scene.png, or why there is none."""
+    from fringetrace import views
+
+    try:
+        views.picture(bench.scene, paths, folder / "scene.png", relief=bench.scene.surfaces[1].name)
+    except RuntimeError as error:
+        return str(error)
+    return None
+
+
+@contextlib.contextmanager
+def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on standard error, once the work has taken a second."""
+    start, bars = time.monotonic(), contextlib.ExitStack()
+    shown: list[Callable[[int, int], None]] = []
+
+    def advance(done: int, total: int) -> None:
+        if not shown and done < total and time.monotonic() - start > PATIENCE:
+            from rich.console import Console
+            from rich.progress import Progress
+
+            bar = bars.enter_context(Progress(console=Console(stderr=True), transient=True))
+            task = bar.add_task(what)
+            shown.append(lambda done, total: bar.update(task, completed=done, total=total))
+        for show in shown:
+            show(done, total)
+
+    with bars:
+        yield advance
+
+
+def _say(console: Console, what: str, text: str) -> None:
+    console.print(f"{what:<12} {text}", markup=False)
+
+
+def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength: float) -> None:
+    from fringetrace.bench import path_slope
+
+    rows, columns = bench.ccd.shape
+    width, height = bench.ccd.size
+    moved = "lateral centre moved onto the axis, highest point to z = 0"
+    _say(console, "sample", f"{name}: {len(mesh.faces):,} triangles; {moved}")
+    fringes = path_slope(bench.tilt)[0] * width / wavelength
+    _say(
+        console,
+        "bench",
+        f"Michelson, {_length(wavelength)}, image {_length(width)} x {_length(height)}, "
+        f"{columns} x {rows} pixels of {_length(bench.ccd.pitch)}; "
+        f"reference tilted by {bench.tilt[0] * 1e6:.4g} urad: {fringes:.3g} fringes across",
+    )
+    if abs(fringes) > 0.5 * columns:
+        _say(
+            console,
+            "note",
+            "the tilt makes more than half a fringe a pixel: fringes alias; use less tilt or more pixels",
+        )
+
+
+def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: float) -> None:
+    paths, power = bench.trace(), measured.ledger
+    rays = bench.beam.shape[0] * bench.beam.shape[1]
+    _say(
+        console,
+        "traced",
+        f"{rays:,} rays, {paths.segments:,} segments, at most {paths.bounces.max()} bounces, {len(paths):,} "
+        f"path ends in {seconds:.2f} s: {rays / seconds:,.0f} rays/s",
+    )
+    shares = ", ".join(
+        f"{item} {getattr(power, item) / power.incident:.4%}"
+        for item in ("detected", "left", "absorbed", "truncated")
+    )
+    _say(console, "power", f"{shares}; unaccounted for {power.error:.1e} of the incident")
+    valid, smooth = np.isfinite(measured.residual), measured.smooth
+    _say(
+        console,
+        "height",
+        f"differs from the mesh by {_rms(measured, valid)} over {valid.mean():.1%} of the pixels, "
+        f"{_rms(measured, valid & smooth)} away from steps (over {(valid & smooth).mean():.1%})",
+    )
+    jumps = int((np.abs(measured.residual[valid]) > 0.25 * measured.wavelength).sum())
+    if jumps:
+        _say(
+            console,
+            "note",
+            f"{jumps:,} pixels are off by whole half wavelengths: steps of over a quarter of the wavelength "
+            "between pixels cannot be told from smaller ones at one wavelength",
+        )
+    _say(
+        console,
+        "16 bits",
+        f"65535 counts are an irradiance of {measured.full_scale:.6g} times the incident one",
+    )
+
+
+def _rms(measured: Measurement, where: Array) -> str:
+    rms = measured.rms(where)
+    return f"{rms * 1e9:.3g} nm = {rms / measured.wavelength:.2g} waves rms"
+
+
+def _length(metres: float) -> str:
+    name, unit = unit_of(metres)
+    return f"{metres / unit:.4g} {name}"
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+
+    Returns
+    -------
+    int
+        0; 2 after an error, said in one line on standard error; 130 if interrupted.
+    """
+    try:
+        command, bound, _ = app.parse_args(arguments, print_error=False, exit_on_error=False)
+        command(*bound.args, **bound.kwargs)
+    except (CycloptsError, ValueError, OSError, RuntimeError, MemoryError) as error:
+        text = " ".join(str(error).split()) or type(error).__name__
+        sys.stderr.write(f"fringetrace: {text}\n")
+        return FAILURE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    return 0

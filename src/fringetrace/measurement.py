@@ -1,0 +1,331 @@
+"""A measurement on a bench next to the truth, and its files: PNG, TIFF, NetCDF."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.bench import Bench, path_slope, pixel_centres
+from fringetrace.meshes import interpolate_height
+from fringetrace.paths import Ledger
+from fringetrace.scene import Mesh
+from fringetrace.waves import Array, FloatArray
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+# What a 16-bit camera counts at full scale.
+COUNTS = 65535
+LIBRARIES = ("fringetrace", "numpy", "embreex", "numba", "scikit-image")
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What a bench recorded of a sample, and how the height found differs from that of the mesh.
+
+    Attributes
+    ----------
+    wavelength : float, metres
+    pitch : float, metres
+        Side of a pixel.
+    tilt : (tilt_x, tilt_y), radians
+    frames : (steps, rows, columns) float64
+        |E|^2 at equal phase steps; the first is the interferogram.
+    wrapped : (rows, columns) float64, radians
+    height, truth : (rows, columns) float64, metres
+        As measured, and of the mesh.
+    residual : (rows, columns) float64, metres
+        height - truth, less its mean (over pixels of the right fringe order): a height is measured
+        up to a constant. NaN where either is unknown.
+    smooth : (rows, columns) bool
+        Away from steps: the mesh changes by less than wavelength / 4 to each neighbour.
+    ledger : Ledger
+    """
+
+    wavelength: float
+    pitch: float
+    tilt: tuple[float, float]
+    frames: FloatArray
+    wrapped: FloatArray
+    height: FloatArray
+    truth: FloatArray
+    residual: FloatArray
+    smooth: Array
+    ledger: Ledger
+
+    @property
+    def interferogram(self) -> FloatArray:
+        """(rows, columns) float64, |E|^2."""
+        return np.asarray(self.frames[0])
+
+    @property
+    def full_scale(self) -> float:
+        """|E|^2 of 65535 counts in the 16-bit files: 1, or that of the brightest pixel if it is above 1."""
+        return max(1.0, float(self.frames.max()))
+
+    @property
+    def fringes(self) -> float:
+        """Fringes across the image that the tilt alone makes, along its steeper axis."""
+        rows, columns = self.truth.shape
+        slope_x, slope_y = path_slope(self.tilt)
+        return float(max(abs(slope_x) * columns, abs(slope_y) * rows) * self.pitch / self.wavelength)
+
+    def rms(self, where: Array | None = None) -> float:
+        """Root mean square of the residual.
+
+        Parameters
+        ----------
+        where : (rows, columns) bool, optional
+            Default: wherever there is a residual.
+
+        Returns
+        -------
+        float, metres
+            NaN if there are none.
+        """
+        chosen = np.isfinite(self.residual) if where is None else where & np.isfinite(self.residual)
+        return float(np.sqrt(np.mean(self.residual[chosen] ** 2))) if chosen.any() else math.nan
+
+
+def heights(
+    mesh: Mesh, shape: tuple[int, int], pitch: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0)
+) -> FloatArray:
+    """Heights of a mesh at the centres of pixels.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    shape : (rows, columns)
+    pitch : float, metres
+    centre : (3,) array-like, metres
+        The point that is in the middle of the image, and at height 0.
+
+    Returns
+    -------
+    (rows, columns) float64, metres
+        NaN where there is no mesh.
+    """
+    x, y = pixel_centres(shape, pitch)
+    x0, y0, z0 = np.asarray(centre, dtype=np.float64)
+    return np.asarray(interpolate_height(mesh, x[None, :] + x0, y[:, None] + y0) - z0)
+
+
+def _smooth(truth: FloatArray, limit: float) -> Array:
+    """Where heights change by less than `limit` to all neighbours; steps and rims are left out."""
+    padded = np.pad(truth, 1, mode="edge")
+    middle = padded[1:-1, 1:-1]
+    around = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
+    return np.asarray(np.all([np.abs(side - middle) < limit for side in around], axis=0))
+
+
+def _piston(differences: FloatArray, wavelength: float) -> float:
+    """Mean of differences of height, leaving out those that are off by half a wavelength or more."""
+    if not differences.size:
+        return 0.0
+    middle = float(np.median(differences))
+    about = differences - middle
+    return middle + float(about[np.abs(about) <= 0.25 * wavelength].mean())
+
+
+def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) -> Measurement:
+    """Record phase-stepped frames on a bench, find the height, and compare it with the truth.
+
+    Parameters
+    ----------
+    bench : Bench
+    truth : (rows, columns) float64, metres
+        Heights at the pixels, see `heights`.
+    wavelength : float, metres
+    steps : int, at least 3
+
+    Returns
+    -------
+    Measurement
+    """
+    frames, height = bench.phase_steps(wavelength, steps), bench.height(wavelength, steps)
+    both = np.isfinite(height) & np.isfinite(truth)
+    residual = np.where(both, height - truth, np.nan)
+    return Measurement(
+        wavelength=wavelength,
+        pitch=bench.ccd.pitch,
+        tilt=bench.tilt,
+        frames=frames,
+        wrapped=bench.wrapped(wavelength, steps),
+        height=height,
+        truth=truth,
+        residual=residual - _piston(residual[both], wavelength),
+        smooth=_smooth(truth, 0.25 * wavelength),
+        ledger=bench.trace().ledger(),
+    )
+
+
+@contextlib.contextmanager
+def staged(folder: Path) -> Iterator[Path]:
+    """A place to write in; all files move on to `folder` at the end, none of them if something fails.
+
+    Parameters
+    ----------
+    folder : Path
+        Made if it does not exist, and taken away again if something fails.
+
+    Yields
+    ------
+    Path
+        An empty folder inside of `folder`.
+
+    Raises
+    ------
+    OSError
+        If nothing can be written there.
+    """
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=folder) as part:
+            yield Path(part)
+            for file in sorted(Path(part).iterdir()):
+                os.replace(file, folder / file.name)
+    except BaseException:
+        for path in made:
+            with contextlib.suppress(OSError):
+                path.rmdir()
+        raise
+
+
+def dataset(measurement: Measurement) -> Dataset:
+    """Everything, labelled.
+
+    Parameters
+    ----------
+    measurement : Measurement
+
+    Returns
+    -------
+    xarray.Dataset
+        Coordinates x, y (metres) and step (radians); units in the attributes of each variable.
+    """
+    import xarray
+
+    m = measurement
+    steps, *shape = m.frames.shape
+    x, y = pixel_centres((shape[0], shape[1]), m.pitch)
+    image, stack = ("y", "x"), ("step", "y", "x")
+    one = {"units": "1", "long_name": "irradiance / incident irradiance, |E|^2"}
+    variables = {
+        "interferogram": (image, m.interferogram, one),
+        "frames": (stack, m.frames, {**one, "comment": "phase-stepped: step is added to the reference"}),
+        "wrapped_phase": (
+            image,
+            m.wrapped,
+            {"units": "rad", "long_name": "reference - sample, with carrier"},
+        ),
+        "height": (image, m.height, {"units": "m", "comment": "up to a constant"}),
+        "mesh_height": (image, m.truth, {"units": "m", "long_name": "height of the mesh"}),
+        "residual": (image, m.residual, {"units": "m", "long_name": "height - mesh_height - mean"}),
+    }
+    coordinates = {
+        "x": ("x", x, {"units": "m"}),
+        "y": ("y", y, {"units": "m"}),
+        "step": ("step", 2.0 * np.pi * np.arange(steps) / steps, {"units": "rad"}),
+    }
+    attributes = {
+        "title": "Michelson interferogram",
+        "wavelength_m": m.wavelength,
+        "pixel_pitch_m": m.pitch,
+        "reference_tilt_rad": list(m.tilt),
+        "residual_rms_m": m.rms(),
+        "residual_rms_away_from_steps_m": m.rms(m.smooth),
+        **{f"power_{name}": value for name, value in vars(m.ledger).items()},
+        **{f"version_{name}": version(name) for name in LIBRARIES},
+    }
+    return xarray.Dataset(variables, coordinates, attributes)
+
+
+def write_netcdf(measurement: Measurement, path: Path) -> None:
+    """`dataset` as a NetCDF file.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    path : Path
+    """
+    dataset(measurement).to_netcdf(path, engine="h5netcdf")
+
+
+def counts(images: FloatArray, full_scale: float) -> Array:
+    """Irradiance as a 16-bit camera counts it, top row first.
+
+    Parameters
+    ----------
+    images : (..., rows, columns) float64
+        |E|^2.
+    full_scale : float
+        |E|^2 of 65535 counts.
+
+    Returns
+    -------
+    (..., rows, columns) uint16
+        Rounded; first the row with the largest y, as picture files have it.
+    """
+    return np.rint(images[..., ::-1, :] * (COUNTS / full_scale)).clip(0, COUNTS).astype(np.uint16)
+
+
+def write_camera(measurement: Measurement, folder: Path) -> None:
+    """interferogram.tif and frames.tif: 16-bit, with the full scale in their description.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    folder : Path
+    """
+    import tifffile
+
+    m = measurement
+    notes = {
+        "full_scale": m.full_scale,
+        "full_scale_meaning": "|E|^2 of 65535 counts; 1 is the incident irradiance",
+        "wavelength_m": m.wavelength,
+        "pixel_pitch_m": m.pitch,
+        "first_row": "largest y",
+    }
+    per_centimetre = 0.01 / m.pitch
+    for name, images in (("interferogram", m.interferogram), ("frames", m.frames)):
+        tifffile.imwrite(
+            folder / f"{name}.tif", counts(images, m.full_scale), photometric="minisblack",
+            description=json.dumps(notes), metadata=None, resolution=(per_centimetre, per_centimetre),
+            resolutionunit="CENTIMETER", software="fringetrace",
+        )  # fmt: skip
+
+
+def write_pictures(measurement: Measurement, folder: Path) -> None:
+    """interferogram.png, and height.png with the residual beside the height.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    folder : Path
+    """
+    from matplotlib.figure import Figure
+
+    from fringetrace import views
+
+    m = measurement
+    image = views.interferogram(m.interferogram, m.pitch, wavelength=m.wavelength, title="Interferogram")
+    views.save(image, folder / "interferogram.png")
+    figure = Figure(figsize=(12.0, 5.0))
+    figure.subplots_adjust(left=0.06, right=0.91, bottom=0.11, top=0.92, wspace=0.4)
+    left, right = figure.subplots(1, 2)
+    views.height(m.height, m.pitch, left, title="Height, measured")
+    views.residual(m.residual, m.pitch, right, wavelength=m.wavelength, title="Measured − mesh")
+    views.save(figure, folder / "height.png")
