@@ -1,33 +1,43 @@
 """The engine's brute-force twin: every triangle, in float64, no tree and no float32.
 
-It shares no code with the engine. Ties within `TIE` (of the scene's size) are shared edges.
+It shares no code with the engine: Moeller and Trumbore's test here, planes there.
 """
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
 import numpy as np
-from numba import njit, prange
+from numba import njit
+
+from fringetrace import Fate
+
+# A crossing counts this part of a triangle outside it: neighbours must not let a ray through between
+# them because each rounds its own way.
+RIM = 1e-12
+# Two hits this near to each other, relative to the path up to there, are a tie at a shared edge.
+TIE = 1e-12
 
 
-@njit(cache=True)
-def _near(o, d, centre, square):
-    """Whether a ray's line passes within a sphere."""
-    w = centre - o
-    along = w @ d
-    return w @ w - along * along <= square
-
-
-@njit(parallel=True, cache=True)
-def first_hits(origin, direction, left, corners, centre, square, group, path, triangle, slack):
-    """Nearest crossing of each ray, by Moeller and Trumbore over all triangles but the one left.
-
-    `group` (g + 1,) splits the triangles into runs, each inside a sphere (`centre`, `square`).
-    """
-    for i in prange(len(origin)):
-        o, d = origin[i], direction[i]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _first_hits(origin, direction, left, corners, lower, upper, group, slack, rim, path, triangle):
+    maybe, entry = np.empty(lower.shape[1], np.bool_), np.empty(lower.shape[1])
+    for i in range(len(origin)):
+        ox, oy, oz = origin[i]
+        dx, dy, dz = direction[i]
+        fx, fy, fz = 1.0 / dx, 1.0 / dy, 1.0 / dz
         best, which = np.inf, -1
-        for g in range(len(centre)):
-            if not _near(o, d, centre[g], square[g]):
+        for g in range(len(maybe)):
+            x, u = (lower[0, g] - ox) * fx, (upper[0, g] - ox) * fx
+            y, v = (lower[1, g] - oy) * fy, (upper[1, g] - oy) * fy
+            z, w = (lower[2, g] - oz) * fz, (upper[2, g] - oz) * fz
+            begin = max(max(min(x, u), min(y, v)), min(z, w))
+            end = min(min(max(x, u), max(y, v)), max(z, w))
+            maybe[g] = not (begin > end or end < 0.0)
+            entry[g] = begin
+        for g in range(len(maybe)):
+            if not maybe[g] or entry[g] > best:
                 continue
             for k in range(group[g], group[g + 1]):
                 if k == left[i]:
@@ -35,17 +45,17 @@ def first_hits(origin, direction, left, corners, centre, square, group, path, tr
                 ax, ay, az = corners[k, 0, 0], corners[k, 0, 1], corners[k, 0, 2]
                 ux, uy, uz = corners[k, 1, 0] - ax, corners[k, 1, 1] - ay, corners[k, 1, 2] - az
                 vx, vy, vz = corners[k, 2, 0] - ax, corners[k, 2, 1] - ay, corners[k, 2, 2] - az
-                px, py, pz = d[1] * vz - d[2] * vy, d[2] * vx - d[0] * vz, d[0] * vy - d[1] * vx
+                px, py, pz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
                 det = ux * px + uy * py + uz * pz
                 if det == 0.0:
                     continue
-                sx, sy, sz = o[0] - ax, o[1] - ay, o[2] - az
+                sx, sy, sz = ox - ax, oy - ay, oz - az
                 a = (sx * px + sy * py + sz * pz) / det
-                if a < 0.0 or a > 1.0:
+                if a < -rim or a > 1.0 + rim:
                     continue
                 qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
-                b = (d[0] * qx + d[1] * qy + d[2] * qz) / det
-                if b < 0.0 or a + b > 1.0:
+                b = (dx * qx + dy * qy + dz * qz) / det
+                if b < -rim or a + b > 1.0 + rim:
                     continue
                 t = (vx * qx + vy * qy + vz * qz) / det
                 if slack < t < best:
@@ -53,23 +63,140 @@ def first_hits(origin, direction, left, corners, centre, square, group, path, tr
         path[i], triangle[i] = best, which
 
 
-def spheres(corners: np.ndarray, run: int = 32) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bounding spheres of runs of triangles (in the order of the mesh)."""
-    group = np.append(np.arange(0, len(corners), run), len(corners))
-    centre = np.empty((len(group) - 1, 3))
-    square = np.empty(len(group) - 1)
-    for g in range(len(centre)):
-        points = corners[group[g] : group[g + 1]].reshape(-1, 3)
-        centre[g] = 0.5 * (points.min(axis=0) + points.max(axis=0))
-        square[g] = ((points - centre[g]) ** 2).sum(axis=1).max() * (1 + 1e-9)
-    return centre, square, group
+def _boxes(corners, run):
+    """Boxes (3, g) around runs of triangles, in the order of the mesh: most are passed by."""
+    start = np.arange(0, len(corners), run)
+    low = np.minimum.reduceat(corners.min(axis=1), start)
+    high = np.maximum.reduceat(corners.max(axis=1), start)
+    # wider than any rounding, and no ray starts on a face
+    wide = 1e-6 * (high - low).max(axis=1, keepdims=True)
+    return (low - wide).T.copy(), (high + wide).T.copy(), np.append(start, len(corners))
 
 
 def nearest(corners, origin, direction, left, slack=0.0):
-    """Path (inf: none) and triangle (-1: none) of each ray's first hit; see `first_hits`."""
+    """First crossing of each ray, over all triangles but the one left.
+
+    Parameters
+    ----------
+    corners : (t, 3, 3) float64, metres
+    origin, direction : (n, 3) float64
+    left : (n,) int
+        Triangle that the ray starts on; -1: none.
+    slack : float, metres
+        Crossings nearer than this do not count.
+
+    Returns
+    -------
+    path : (n,) float64, metres; inf: none
+    triangle : (n,) int64; -1: none
+    """
+    origin, direction = (np.ascontiguousarray(rows, dtype=np.float64) for rows in (origin, direction))
+    left = np.ascontiguousarray(left, dtype=np.int64)
     path, triangle = np.empty(len(origin)), np.empty(len(origin), dtype=np.int64)
-    first_hits(
-        np.ascontiguousarray(origin), np.ascontiguousarray(direction), np.asarray(left, dtype=np.int64),
-        np.ascontiguousarray(corners), *spheres(corners), path, triangle, slack,
-    )  # fmt: skip
+    corners = np.ascontiguousarray(corners)
+    lower, upper, group = _boxes(corners, 16 if len(corners) < 20000 else 64)
+
+    def some(rows):
+        _first_hits(
+            origin[rows], direction[rows], left[rows], corners, lower, upper, group, slack, RIM,
+            path[rows], triangle[rows],
+        )  # fmt: skip
+
+    middle = len(origin) // 2
+    with ThreadPoolExecutor(2) as pool:
+        list(pool.map(some, (slice(0, middle), slice(middle, None))))
     return path, triangle
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What the twin says of recorded paths: counts, and the largest errors relative to the path.
+
+    `distance` is off along the ray, `aside` is how far from the reflected ray a hit lies. `wrong` are
+    hits at another place than the twin's: (path, bounce, triangle, the twin's triangle).
+    """
+
+    bounces: int = 0
+    itself: int = 0
+    ties: int = 0
+    distance: float = 0.0
+    aside: float = 0.0
+    wrong: tuple[tuple[int, int, int, int], ...] = ()
+
+    def __add__(self, other):
+        return Verdict(
+            self.bounces + other.bounces, self.itself + other.itself, self.ties + other.ties,
+            max(self.distance, other.distance), max(self.aside, other.aside), self.wrong + other.wrong,
+        )  # fmt: skip
+
+
+def corners_of(scene):
+    """Corners (t, 3, 3) of all triangles of a scene, and the number of each surface's first.
+
+    Each triangle begins with the corner opposite its longest side: the sides that meet there give the
+    normal with the most digits.
+    """
+    meshes = [surface.mesh for surface in scene.surfaces]
+    first = np.cumsum([0] + [len(mesh.faces) for mesh in meshes])[:-1]
+    corners = np.concatenate([mesh.vertices[mesh.faces] for mesh in meshes])
+    opposite = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1), axis=2)
+    turn = (opposite.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(corners, turn[:, :, None], axis=1), first
+
+
+def judge(paths, slack=1e-13):
+    """Find every segment of recorded paths again, each from its recorded start.
+
+    Directions are reflected here, one bounce after the other, off the recorded triangles; those of
+    segments that are not very short are read off their ends, because at grazing incidence a rounding
+    of the direction moves the hit far. Where a path left, the twin must find nothing.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of mirrors, recorded.
+    slack : float
+        Part of the scene's size below which a crossing is the start itself.
+
+    Returns
+    -------
+    Verdict
+    """
+    corners, first = corners_of(paths.scene)
+    size = np.ptp(corners.reshape(-1, 3), axis=0).max()
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    triangle = np.where(paths.triangle >= 0, paths.triangle + first[paths.surface], -1)
+    triangle = np.pad(triangle, ((0, 0), (1, 1)), constant_values=-1)
+    direction = paths.source.direction[paths.ray].copy()
+    way = np.zeros(len(paths))
+    verdict = Verdict()
+    for k in range(int(paths.bounces.max(initial=0)) + 1):
+        rows = np.flatnonzero((paths.bounces > k) | ((paths.bounces == k) & (paths.fate == Fate.LEFT)))
+        left, mine = triangle[rows, k], triangle[rows, k + 1]
+        met = mine >= 0
+        start, d = paths.points[rows, k], direction[rows]
+        step = np.where(met[:, None], paths.points[rows, k + 1] - start, 0.0)
+        length = np.linalg.norm(step, axis=1)
+        way[rows] += length
+        aside = np.linalg.norm(step - np.einsum("ij,ij->i", step, d)[:, None] * d, axis=1)[met] / way[rows[met]]
+        long = length > 1e-6 * size
+        seen = d.copy()
+        seen[long] = step[long] / length[long, None]
+        path, twins = nearest(corners, start, seen, left, slack * size)
+        off = np.full(len(rows), np.inf)
+        both = met & (twins >= 0)
+        off[both] = np.abs(path - length)[both] / way[rows[both]]
+        off[~met & (twins < 0)] = 0.0
+        wrong = (off > TIE) & (mine != twins)
+        verdict += Verdict(
+            bounces=int(met.sum()),
+            itself=int(((mine == left) & met).sum()),
+            ties=int((~wrong & (mine != twins)).sum()),
+            distance=float(off[~wrong].max(initial=0.0)),
+            aside=float(aside.max(initial=0.0)),
+            wrong=tuple((int(rows[j]), k, int(mine[j]), int(twins[j])) for j in np.flatnonzero(wrong)),
+        )
+        n, d = normal[mine[met]], d[met]
+        direction[rows[met]] = d - 2.0 * np.einsum("ij,ij->i", d, n)[:, None] * n
+    return verdict

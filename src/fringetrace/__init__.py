@@ -19,7 +19,7 @@ from fringetrace.trace import stream, trace
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
-    from fringetrace import instruments, meshes, phase, shapes, views
+    from fringetrace import instruments, meshes, phase, shapes, vectors, views
 
 __version__ = _version("fringetrace")
 
@@ -48,11 +48,12 @@ __all__ = [
     "stream",
     "trace",
     "um",
+    "vectors",
     "views",
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("instruments", "meshes", "phase", "shapes", "views")
+_ROOMS = ("instruments", "meshes", "phase", "shapes", "vectors", "views")
 
 
 def __getattr__(name: str) -> Any:

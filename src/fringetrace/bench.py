@@ -14,6 +14,7 @@ from fringetrace.field import complex_field
 from fringetrace.paths import Paths
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.trace import stream, trace
+from fringetrace.vectors import frame
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength, wavenumber
 
 
@@ -91,7 +92,8 @@ class Bench:
         -------
         (n, rows, columns) complex128, n at least 2
             [0] is the light that met the sample only, [1] the reference. A phase step of delta
-            on the reference multiplies [m] by exp(i m delta).
+            on the reference multiplies [m] by exp(i m delta). Each ray counts at the centre of
+            its part of the pixel, see `centred`.
         """
         wavelength = checked_wavelength(wavelength)
         if self.derived.get("wavelength") != wavelength:
@@ -129,7 +131,8 @@ class Bench:
         return total
 
     def _summed(self, paths: Paths, wavelength: float) -> ComplexArray:
-        visits = paths.visits(self.reference)
+        parts = max(1, self.beam.shape[1] // self.ccd.shape[1])
+        visits, paths = paths.visits(self.reference), centred(paths, parts)
         orders = range(max(2, int(visits.max(initial=0)) + 1))
         return np.stack([complex_field(paths.where(visits == order), wavelength) for order in orders])
 
@@ -239,10 +242,49 @@ class Bench:
         (rows, columns) float64, metres
             Up to a constant (the piston, and whole half wavelengths); NaN where either arm brings
             no light. Steps between neighbouring pixels must stay under wavelength / 4.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than 3 steps, or no pixel with light from both arms.
         """
         measured = self.wrapped(wavelength, steps)
+        if np.isnan(measured).all():
+            raise ValueError("height: expected pixels with light from both arms, got none")
         flat = phase.wrap(measured - self.carrier(wavelength))
         return phase.height(phase.unwrap(flat), wavelength)
+
+
+def centred(paths: Paths, parts: int = 1) -> Paths:
+    """Paths continued, as plane waves, to the centres of the pixels (or of parts of them) they fall in.
+
+    A ray that lands beside the centre brings the phase of where it landed; summed as it is, a
+    tilted wave would be sampled on a grid other than that of the pixels.
+
+    Parameters
+    ----------
+    paths : Paths
+        All of them detected.
+    parts : int
+        Parts of a pixel along either axis.
+
+    Returns
+    -------
+    Paths
+        With other lengths, L + d . (centre - point), and otherwise the same.
+
+    Raises
+    ------
+    ValueError
+        If the paths were traced without a CCD.
+    """
+    if paths.ccd is None:
+        raise ValueError("centred: expected paths traced onto a CCD, got paths without one")
+    u, v, _ = frame(paths.ccd.normal, paths.ccd.up, "CCD")
+    fine = paths.pixel * parts
+    shift = (np.floor(fine) + 0.5 - fine) * (paths.ccd.pitch / parts)
+    continued = shift[:, 0] * (paths.direction @ v) + shift[:, 1] * (paths.direction @ u)
+    return replace(paths, length=paths.length + continued)
 
 
 def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:

@@ -35,6 +35,8 @@ app = App(
 FRINGES = 10.0
 # The demo's relief and aperture: slopes that 512 pixels still resolve.
 RELIEF, APERTURE = 2e-6, 8e-3
+# Seen from above, a mesh whose sides differ by more than this stands upright.
+UPRIGHT = 1e-9
 # Work that is done sooner needs no progress bar, seconds.
 PATIENCE = 1.0
 # Rays of the 3D picture along the longer side.
@@ -179,8 +181,10 @@ def _bench(
         raise ValueError(f"--pixels: expected at least 1, got {settings.pixels}")
     low, high = mesh.bounds
     sides = (high - low)[1::-1]
-    if not sides.all():
+    if not sides.min() > UPRIGHT * sides.max():
         raise ValueError(f"{mesh.name}: expected a surface across z, got {sides[1]:g} m x {sides[0]:g} m")
+    if aperture is not None and not aperture > 0.0:
+        raise ValueError(f"--aperture: expected a positive length, got {aperture:g} m")
     rows, columns = (max(1, round(settings.pixels * side / sides.max())) for side in sides)
     width = (sides.max() if aperture is None else aperture) * columns / settings.pixels
     tilt = min(FRINGES * wavelength / (2.0 * width), 0.5 * instruments.TILT)
@@ -216,16 +220,18 @@ def _draw(bench: Bench, paths: Paths, folder: Path) -> str | None:
 
 @contextlib.contextmanager
 def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on standard error, once the work has taken a second."""
+    """A progress bar on standard error, if that is a terminal, once the work has taken a second."""
+    from rich.console import Console
+
+    console = Console(stderr=True)
     start, bars = time.monotonic(), contextlib.ExitStack()
     shown: list[Callable[[int, int], None]] = []
 
     def advance(done: int, total: int) -> None:
-        if not shown and done < total and time.monotonic() - start > PATIENCE:
-            from rich.console import Console
+        if not shown and console.is_terminal and done < total and time.monotonic() - start > PATIENCE:
             from rich.progress import Progress
 
-            bar = bars.enter_context(Progress(console=Console(stderr=True), transient=True))
+            bar = bars.enter_context(Progress(console=console, transient=True))
             task = bar.add_task(what)
             shown.append(lambda done, total: bar.update(task, completed=done, total=total))
         for show in shown:
@@ -305,7 +311,7 @@ def _rms(measured: Measurement, where: Array) -> str:
 
 def _length(metres: float) -> str:
     name, unit = unit_of(metres)
-    return f"{metres / unit:.4g} {name}"
+    return f"{metres / unit:.4g} {name.replace('µ', 'u')}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -81,11 +81,13 @@ def _thinned(routes: Sequence[tuple[str, Array]], ray: Array) -> list[tuple[str,
     return [(name, few if len(few) else rows) for (name, few), (_, rows) in zip(thin, routes, strict=True)]
 
 
-def _onto_chip(paths: Paths, row: int) -> FloatArray:
-    """A polyline that ends on the chip itself, not in the plane that it is focused on."""
+def _line(paths: Paths, row: int, onward: float) -> FloatArray:
+    """A polyline that ends on the chip itself (not in its plane of focus), or a bit on where light left."""
     line, ccd, direction = paths.polyline(row), paths.ccd, paths.direction[row]
     if ccd is not None and paths.fate[row] == Fate.DETECTED:
         line[-1] += ((ccd.centre - line[-1]) @ ccd.normal) / (direction @ ccd.normal) * direction
+    elif paths.fate[row] == Fate.LEFT:
+        line = np.concatenate([line, [line[-1] + onward * direction]])
     return line
 
 
@@ -99,7 +101,8 @@ def _drawing(scene: Scene, paths: Paths | None, colour: str, relief: str | None)
     if colour not in ("route", "length"):
         raise ValueError(f"colour: expected 'route' or 'length', got {colour!r}")
     bounds = np.array([surface.mesh.bounds for surface in scene.surfaces])
-    unit, metres = unit_of(0.5 * float(np.ptp(bounds.reshape(-1, 3), axis=0).max()))
+    size = float(np.ptp(bounds.reshape(-1, 3), axis=0).max())
+    unit, metres = unit_of(0.5 * size)
     drawing: dict[str, Any] = {"unit": unit, "metres": metres, "colour": colour, "routes": []}
     chosen = None if relief is None else scene.index(relief)
     drawing["surfaces"] = [
@@ -108,14 +111,14 @@ def _drawing(scene: Scene, paths: Paths | None, colour: str, relief: str | None)
             surface.mesh.vertices,
             surface.mesh.faces,
             isinstance(surface.interface, BeamSplitter),
-            number == chosen,
+            number == chosen and np.ptp(surface.mesh.vertices[:, 2]) > 0.0,
         )
         for number, surface in enumerate(scene.surfaces)
     ]
     if paths is None:
         return drawing
     for name, rows in _thinned(_routes(paths), paths.ray):
-        drawing["routes"].append((name, [_onto_chip(paths, int(row)) for row in rows]))
+        drawing["routes"].append((name, [_line(paths, int(row), 0.3 * size) for row in rows]))
     if isinstance(paths.source, Beam):
         beam = paths.source
         u, v, n = frame(beam.direction, beam.up, "Beam")
@@ -248,7 +251,9 @@ def _draw(plotter: Plotter, drawing: dict[str, Any]) -> None:
 def _child(code: str, sent: bytes = b"") -> None:
     """Draw in another process: without its libraries VTK crashes the interpreter it is in."""
     try:
-        done = subprocess.run([sys.executable, "-c", code], input=sent, capture_output=True, timeout=SECONDS)
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", code], input=sent, capture_output=True, timeout=SECONDS
+        )
     except subprocess.TimeoutExpired as error:
         raise RuntimeError(f"3D picture: gave up after {SECONDS:g} s") from error
     if done.returncode < 0 or done.returncode >= 128:

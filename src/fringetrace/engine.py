@@ -14,16 +14,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.rays import Batch
-from fringetrace.scene import Scene, Surface
+from fringetrace.rays import Batch, Ends
+from fringetrace.scene import Mesh, Scene, Surface
 from fringetrace.waves import Array, FloatArray
 
 IntArray = npt.NDArray[np.int64]
 EPSILON = float(np.finfo(np.float64).eps)
-# Scenes with no more surfaces than this keep one body for each.
-FEW = 8
 # A body may be this many times larger than the smallest surface in it: float32 has bits to spare.
 SPREAD = 64.0
+# Surfaces share a body only with this part of their size between them: far more than float32 blurs.
+CLEAR = 1e-3
+# How many faces lend their planes to the test for that, and from how many vertices on a box stands in.
+FACES, MANY = 16, 10000
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,7 @@ class Body:
     vertices: FloatArray  # (v, 3), unit box
     faces: IntArray
     planes: FloatArray  # (t, 16)
+    gentle: npt.NDArray[np.bool_]  # (t,), all three edges are shared, with folds of 26 degrees or less
     frame: FloatArray  # (7,)
     oriented: bool
     closed: bool
@@ -82,7 +85,7 @@ class Body:
         tree = self.tree
         return (
             self.first, self.stop, self.oriented, self.closed, self.frame, self.planes,
-            tree.corners, tree.order, tree.lower, tree.upper,
+            self.gentle, tree.corners, tree.order, tree.lower, tree.upper,
         )  # fmt: skip
 
 
@@ -102,14 +105,12 @@ class Engine:
 class Hits:
     """What each row of a batch met last, and what Embree is asked (float32).
 
-    `path` in metres, `triangle` (-1: nothing), `point`, its `facet` normal, distance from its `rim`.
+    `met` has the columns that `kernels` names: path (metres), point, normal, distance from the edge;
+    `triangle` is -1 where nothing was met.
     """
 
-    path: FloatArray
+    met: FloatArray
     triangle: IntArray
-    point: FloatArray
-    facet: FloatArray
-    rim: FloatArray
     origin32: npt.NDArray[np.float32]
     direction32: npt.NDArray[np.float32]
     sent: IntArray
@@ -119,11 +120,8 @@ class Hits:
     def blank(rows: int) -> Hits:
         """Room for so many rows."""
         return Hits(
-            path=np.empty(rows),
+            met=np.empty((rows, 8)),
             triangle=np.empty(rows, dtype=np.int64),
-            point=np.empty((rows, 3)),
-            facet=np.empty((rows, 3)),
-            rim=np.empty(rows),
             origin32=np.empty((rows, 3), dtype=np.float32),
             direction32=np.empty((rows, 3), dtype=np.float32),
             sent=np.empty(rows, dtype=np.int64),
@@ -131,16 +129,26 @@ class Hits:
         )
 
 
-def _tree(corners: FloatArray, tolerance: float) -> Tree:
-    from fringetrace import kernels
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Where paths end: on a screen (as `kernels` read it), after so many bounces; the first ray's number."""
 
-    count, leaf = len(corners), kernels.LEAF
+    screen: FloatArray
+    has_screen: bool
+    max_bounces: int
+    first: int
+
+
+def _tree(corners: FloatArray, tolerance: float) -> Tree:
+    from fringetrace import exact
+
+    count, leaf = len(corners), exact.LEAF
     slack = 1e-9 + tolerance
     low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
     leaves = 1 << max(0, (-(-count // leaf) - 1).bit_length())
     order = np.full(leaf * leaves, -1, dtype=np.int32)
     bounds = np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)
-    order[:count] = kernels.arrange(*bounds, bounds[0] + bounds[1], leaves)
+    order[:count] = exact.arrange(*bounds, bounds[0] + bounds[1], leaves)
     lower, upper = np.full((2 * leaves, 3), np.inf), np.full((2 * leaves, 3), -np.inf)
     filled = np.full((2, leaf * leaves, 3), np.array([np.inf, -np.inf])[:, None, None])
     filled[0, :count], filled[1, :count] = low[order[:count]], high[order[:count]]
@@ -171,10 +179,11 @@ def _planes(corners: FloatArray) -> FloatArray:
     return planes
 
 
-def _topology(faces: IntArray, normal: FloatArray) -> tuple[bool, bool, float]:
-    """Whether faces are wound alike, whether they close, and cosine of the sharpest fold.
+def _topology(faces: IntArray, normal: FloatArray) -> tuple[bool, bool, FloatArray]:
+    """Whether faces are wound alike, whether they close, and the cosines of the folds (f, 3).
 
-    The cosine is between the normals of two faces that share an edge: -1 is a knife's edge.
+    The cosine is between the normals of two faces that share an edge: -1 is a knife's edge. An edge
+    that is not shared has NaN.
     """
     count = int(faces.max()) + 1
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -185,8 +194,9 @@ def _topology(faces: IntArray, normal: FloatArray) -> tuple[bool, bool, float]:
     partner = np.minimum(np.searchsorted(ordered, back), len(ordered) - 1)
     shared = ordered[partner] == back
     face, other = np.flatnonzero(shared) // 3, order[partner[shared]] // 3
-    cosine = np.einsum("ij,ij->i", normal[face], normal[other])
-    return oriented, oriented and bool(shared.all()), float(cosine.min(initial=1.0))
+    cosine = np.full(len(edge), np.nan)
+    cosine[shared] = np.einsum("ij,ij->i", normal[face], normal[other])
+    return oriented, oriented and bool(shared.all()), cosine.reshape(-1, 3)
 
 
 def _restart(cosine: float) -> float:
@@ -201,6 +211,8 @@ def _restart(cosine: float) -> float:
 
 
 def _body(surfaces: tuple[Surface, ...], members: tuple[int, ...], first: int) -> Body:
+    from fringetrace.kernels import GENTLE
+
     meshes = [surfaces[i].mesh for i in members]
     shift = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
@@ -215,47 +227,56 @@ def _body(surfaces: tuple[Surface, ...], members: tuple[int, ...], first: int) -
     corners = local[faces]
     planes = _planes(corners)
     oriented, closed, cosine = _topology(faces, planes[:, :3])
+    sharpest = float(np.fmin.reduce(cosine, axis=None, initial=1.0))
     frame = np.empty(7)
     frame[:3], frame[3] = centre, scale
     frame[4] = np.sqrt((local**2).sum(axis=1).max()) * (1.0 + 1e-6) + 1e-5
-    frame[5] = _restart(cosine)
+    frame[5] = _restart(sharpest)
     frame[6] = 32.0 * EPSILON * (1.0 + np.abs(centre).max() * scale)
-    return Body(first, local, faces, planes, frame, oriented, closed, members)
+    gentle = np.asarray((cosine > GENTLE).all(axis=1) & oriented)
+    return Body(first, local, faces, planes, gentle, frame, oriented, closed, members)
+
+
+def _apart(one: Mesh, other: Mesh) -> bool:
+    """Whether a plane stands clearly between two meshes: across an axis, or along a face of either."""
+    normals = [np.eye(3)]
+    for mesh in (one, other):
+        corners = mesh.vertices[mesh.faces[:: max(1, len(mesh.faces) // FACES)]]
+        normals.append(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    axes = np.concatenate(normals)
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    hulls = [mesh.bounds if len(mesh.vertices) > MANY else mesh.vertices for mesh in (one, other)]
+    # a large mesh is taken for its box, all eight corners of it
+    points = [h if len(h) != 2 else np.stack(np.meshgrid(*h.T), axis=-1).reshape(-1, 3) for h in hulls]
+    spans = [p @ axes.T for p in points]
+    gap = np.maximum(
+        spans[0].min(axis=0) - spans[1].max(axis=0), spans[1].min(axis=0) - spans[0].max(axis=0)
+    ).max()
+    size = max(float(np.ptp(mesh.bounds, axis=0).max()) for mesh in (one, other))
+    return bool(gap > CLEAR * size)
 
 
 def _groups(surfaces: tuple[Surface, ...], alone: frozenset[int]) -> list[tuple[int, ...]]:
-    """Which surfaces share a body.
+    """Which surfaces share a body: those of a size that stand clear of each other.
 
-    Few surfaces: none. Many: those of a size that stand clear of each other; what touches or
-    nests stays apart, so that thin gaps are between bodies, where float64 decides.
+    What touches or nests stays apart, so that thin gaps are between bodies, where float64 decides.
     """
-    if len(surfaces) <= FEW:
-        return [(i,) for i in range(len(surfaces))]
     groups: list[list[int]] = []
-    boxes: list[FloatArray] = []
     for i, surface in enumerate(surfaces):
-        box = surface.mesh.bounds
-        size = (box[1] - box[0]).max()
-        wide = box + np.array([[-1e-3], [1e-3]]) * size
         home = None
-        for g in range(len(groups)) if i not in alone else ():
-            members = boxes[g]
-            if groups[g][0] in alone:
+        for group in groups if i not in alone else ():
+            if group[0] in alone:
                 continue
-            smallest = min(size, (members[:, 1] - members[:, 0]).max(axis=1).min())
-            extent = np.maximum(members[:, 1].max(axis=0), box[1]) - np.minimum(
-                members[:, 0].min(axis=0), box[0]
-            )
-            overlap = ((members[:, 0] <= wide[1]) & (members[:, 1] >= wide[0])).all(axis=1)
-            if extent.max() <= SPREAD * smallest and not overlap.any():
-                home = g
+            bounds = np.array([surfaces[k].mesh.bounds for k in [*group, i]])
+            smallest = np.ptp(bounds, axis=1).max(axis=1).min()
+            extent = (bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max()
+            if extent <= SPREAD * smallest and all(_apart(surface.mesh, surfaces[k].mesh) for k in group):
+                home = group
                 break
         if home is None:
             groups.append([i])
-            boxes.append(box[None])
         else:
-            groups[home].append(i)
-            boxes[home] = np.concatenate([boxes[home], box[None]])
+            home.append(i)
     return [tuple(group) for group in groups]
 
 
@@ -290,6 +311,18 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
     return engine
 
 
+def aim(engine: Engine, batch: Batch, rows: int, hits: Hits, number: int, fresh: bool) -> int:
+    """Float32 rays towards a body, into `hits`; returns how many of the batch can meet it."""
+    from fringetrace import kernels
+
+    body = engine.bodies[number]
+    count: int = kernels.aim(
+        rows, batch.state, batch.last, body.frame, body.first, body.stop, hits.met, hits.triangle,
+        fresh, hits.origin32, hits.direction32, hits.sent,
+    )  # fmt: skip
+    return count
+
+
 def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:
     """Nearest hit of each ray, written into `hits`.
 
@@ -314,19 +347,16 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
     origin32, direction32 = hits.origin32, hits.direction32
     doubtful = 0
     fresh = True
-    for body in engine.bodies:
+    for number, body in enumerate(engine.bodies):
         if passed.issuperset(body.surfaces):
             continue
-        count = kernels.aim(
-            rows, batch.origin, batch.direction, batch.last, batch.normal, body.frame, body.first, body.stop,
-            hits.path, hits.triangle, fresh, origin32, direction32, hits.sent,
-        )  # fmt: skip
+        count = aim(engine, batch, rows, hits, number, fresh)
         fresh = False
         if count == 0:
             continue
         prim = body.embree.run(origin32[:count], direction32[:count])
         found = kernels.suspect(
-            hits.sent, count, prim, batch.direction, batch.last, body.first, body.stop, body.closed,
+            hits.sent, count, prim, batch.state, batch.last, body.first, body.stop, body.closed,
             body.frame[4], body.planes, origin32, direction32, hits.asked,
         )  # fmt: skip
         if found:
@@ -334,10 +364,50 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
             rows_asked = hits.asked[:found]
             prim[rows_asked[second != prim[rows_asked]]] = -2
         doubtful += kernels.measure(
-            hits.sent, count, prim, batch.origin, batch.direction, batch.last, batch.normal, batch.edge,
-            batch.straight, *body.packed, hits.path, hits.triangle, hits.point, hits.facet, hits.rim,
+            hits.sent, count, prim, batch.state, batch.last, batch.straight, *body.packed, hits.met, hits.triangle
         )  # fmt: skip
     if fresh:
-        hits.path[:rows] = np.inf
+        hits.met[:rows, 0] = np.inf
         hits.triangle[:rows] = -1
     return doubtful
+
+
+def follow(
+    engine: Engine, batch: Batch, rows: int, hits: Hits, ends: Ends, limits: Limits
+) -> tuple[int, int, int]:
+    """One more bounce of rays that have all just left the only body, all of ideal mirrors.
+
+    Does what `find` and `kernels.interact` do, without amplitudes and in one pass over the rays.
+
+    Parameters
+    ----------
+    engine : Engine
+        Of one body.
+    batch : Batch
+    rows : int
+        How many rays it holds.
+    hits : Hits
+        Its float32 rays are those of the batch; they are brought up to date.
+    ends : Ends
+    limits : Limits
+
+    Returns
+    -------
+    rows, ended, doubtful : int
+        How many rays go on, have ended now, were decided exactly.
+    """
+    from fringetrace import kernels
+
+    body = engine.bodies[0]
+    prim = body.embree.run(hits.origin32[:rows], hits.direction32[:rows])
+    if not body.closed and (prim < 0).any():
+        missed = np.flatnonzero(prim < 0)
+        aside = hits.origin32[missed] + kernels.ASIDE * np.array([0.61, -0.47, 0.64], dtype=np.float32)
+        prim[missed[body.embree.run(aside, hits.direction32[missed]) >= 0]] = -2
+    result: tuple[int, int, int] = kernels.rebound(
+        rows, prim, batch.state, batch.key, batch.ray, batch.last,
+        batch.bounces, batch.straight, *body.packed[2:], engine.owner, len(engine.offset),
+        limits.screen, limits.has_screen, limits.max_bounces, ends.origin, ends.direction, ends.length, ends.key,
+        ends.ray, ends.bounces, ends.fate, 0, limits.first, hits.origin32, hits.direction32,
+    )  # fmt: skip
+    return result

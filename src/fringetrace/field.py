@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fringetrace.paths import Fate, Paths
+from fringetrace.paths import Fate, Paths, pixels
 from fringetrace.waves import ComplexArray, checked_wavelength
 
 
@@ -57,8 +57,8 @@ def complex_field(
         amplitude = part.amplitude[seen] * weight
         if not half_wave_loss:
             amplitude *= 1.0 - 2.0 * (part.reflections[seen] % 2)
-        row, column = part.pixel[seen, 0], part.pixel[seen, 1]
-        kernels.gather(row, column, part.length[seen], amplitude, period, total)
+        pixel = pixels(part.ccd, part.origin[seen])
+        kernels.gather(pixel, part.length[seen], amplitude, period, total)
     if total is None:
         raise ValueError("complex_field: expected at least one Paths, got none")
     return total

@@ -7,13 +7,9 @@ n unit, then three edge planes whose value is the distance inside each edge.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import njit
 
-jit: Any = njit(nogil=True, cache=True, error_model="numpy")
-part: Any = njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+from fringetrace.exact import decide, inset, jit, part
 
 # float32 resolves 2**-24 of the unit box; eight such steps separate a restart from its surface.
 SHIFT = 2.0**-20
@@ -21,15 +17,46 @@ SHIFT = 2.0**-20
 MARGIN = 8.0 * SHIFT
 # A ray leaving flatter than this (cosine to the normal) grazes.
 GRAZING = 0.125
+# A fold with normals nearer than this (cosine) is gentle: a ray steeper than STEEP (cosine to the
+# normal) cannot meet both of its faces, 26 degrees against 30.
+GENTLE, STEEP = 0.9, 0.5
 # On a body that the ray has not just left, Embree starts this far behind the ray.
 BEHIND = 2.0**-18
 # The second opinion on a suspicious answer comes from this far aside.
 ASIDE = 2.0**-19
 
-# Triangles in a leaf of the exact tree.
-LEAF = 4
+# Columns of a batch's `state`: origin, direction, normal of the face last left, optical path (metres),
+# distance of the start from that face's nearest edge (unit box).
+OX, OY, OZ, DX, DY, DZ, NX, NY, NZ, WAY, EDGE = range(11)
+# Columns of `met`: path to what a ray meets next, the point (metres), the normal, distance from the edge.
+PATH, PX, PY, PZ, FX, FY, FZ, RIM = range(8)
 
 DETECTED, LEFT, ABSORBED, TRUNCATED, FAINT, ALIVE = 0, 1, 2, 3, 4, 5
+
+
+@part
+def restart(x, y, z, dx, dy, dz, nx, ny, nz):
+    """A point `SHIFT` above the face that a ray leaves.
+
+    Along the ray: aside, it would pass silhouettes on the wrong side. A grazing ray takes the
+    rest along the normal.
+    """
+    leaving = nx * dx + ny * dy + nz * dz
+    if abs(leaving) > GRAZING:
+        step = SHIFT / abs(leaving)
+        return x + step * dx, y + step * dy, z + step * dz
+    step = SHIFT / GRAZING
+    side = (SHIFT if leaving > 0.0 else -SHIFT) - step * leaving
+    return x + step * dx + side * nx, y + step * dy + side * ny, z + step * dz + side * nz
+
+
+@part
+def bounced(dx, dy, dz, nx, ny, nz):
+    """A direction after reflection; one Newton step keeps its length at 1 over thousands of them."""
+    along = 2.0 * (nx * dx + ny * dy + nz * dz)
+    dx, dy, dz = dx - along * nx, dy - along * ny, dz - along * nz
+    scale = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
+    return dx * scale, dy * scale, dz * scale
 
 
 @jit
@@ -45,7 +72,7 @@ def launch(first, rows, columns, centre, u, v, direction, width, height, start, 
 
 @jit
 def aim(
-    total, origin, direction, last, normal, frame, first, stop, path, triangle, fresh, origin32, direction32, sent
+    total, state, last, frame, first, stop, met, triangle, fresh, origin32, direction32, sent
 ):  # fmt: skip
     """Collect, in float32 and the unit box of a body, the rays that can meet it; return how many.
 
@@ -56,23 +83,14 @@ def aim(
     count = 0
     for row in range(total):
         if fresh:
-            path[row], triangle[row] = np.inf, -1
-        dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
-        x = (origin[row, 0] - cx) * scale
-        y = (origin[row, 1] - cy) * scale
-        z = (origin[row, 2] - cz) * scale
+            met[row, PATH], triangle[row] = np.inf, -1
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        x = (state[row, OX] - cx) * scale
+        y = (state[row, OY] - cy) * scale
+        z = (state[row, OZ] - cz) * scale
         if first <= last[row] < stop:
-            # along the ray: aside, it would pass silhouettes on the wrong side; a grazing one
-            # takes the rest along the normal
-            nx, ny, nz = normal[row, 0], normal[row, 1], normal[row, 2]
-            leaving = nx * dx + ny * dy + nz * dz
-            if abs(leaving) > GRAZING:
-                step = SHIFT / abs(leaving)
-                x, y, z = x + step * dx, y + step * dy, z + step * dz
-            else:
-                step = SHIFT / GRAZING
-                side = (SHIFT if leaving > 0.0 else -SHIFT) - step * leaving
-                x, y, z = x + step * dx + side * nx, y + step * dy + side * ny, z + step * dz + side * nz
+            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+            x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz)
         else:
             along = x * dx + y * dy + z * dz
             qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
@@ -93,7 +111,7 @@ def aim(
 
 @jit
 def suspect(
-    sent, count, prim, direction, last, first, stop, closed, radius, planes, origin32, direction32, asked
+    sent, count, prim, state, last, first, stop, closed, radius, planes, origin32, direction32, asked
 ):  # fmt: skip
     """Move to the front, a little aside, the rays whose answer wants a second opinion.
 
@@ -109,7 +127,7 @@ def suspect(
         if closed:
             if first <= last[row] < stop:
                 continue
-            dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
+            dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
             if tri >= 0:
                 if planes[tri, 0] * dx + planes[tri, 1] * dy + planes[tri, 2] * dz <= 0.0:
                     continue
@@ -129,209 +147,8 @@ def suspect(
 
 
 @jit
-def select(order, keys, start, stop, middle):
-    """Reorder order[start:stop] so that the keys before `middle` are none larger than those after."""
-    low, high = start, stop - 1
-    while low < high:
-        pivot = keys[order[(low + high) // 2]]
-        i, j = low, high
-        while i <= j:
-            while keys[order[i]] < pivot:
-                i += 1
-            while keys[order[j]] > pivot:
-                j -= 1
-            if i <= j:
-                order[i], order[j] = order[j], order[i]
-                i += 1
-                j -= 1
-        if middle <= j:
-            high = j
-        elif middle >= i:
-            low = i
-        else:
-            break
-
-
-@jit
-def girth(order, lower, upper, start, stop):
-    """Half the surface of the box around some triangles, times their number."""
-    x, y, z = 0.0, 0.0, 0.0
-    if stop > start:
-        low, high = lower[:, order[start]].copy(), upper[:, order[start]].copy()
-        for i in range(start, stop):
-            for k in range(3):
-                low[k] = min(low[k], lower[k, order[i]])
-                high[k] = max(high[k], upper[k, order[i]])
-        x, y, z = high[0] - low[0], high[1] - low[1], high[2] - low[2]
-    return (x * y + y * z + z * x) * (stop - start)
-
-
-@jit
-def arrange(lower, upper, middle, leaves):
-    """Order of triangles for a complete binary tree: halved across the axis with the least surface.
-
-    `lower`, `upper`, `middle` are (3, t): the triangles' boxes and their centres.
-    """
-    count = lower.shape[1]
-    order = np.arange(count)
-    stack = [(0, LEAF * leaves)]
-    while len(stack) > 0:
-        start, size = stack.pop()
-        half = size // 2
-        stop = min(start + size, count)
-        # the halves of a node are full from the left: what is missing is missing at the end
-        if size <= LEAF or stop - start <= half:
-            if size > LEAF and stop > start:
-                stack.append((start, half))
-            continue
-        cheapest, axis = np.inf, 0
-        for k in range(3):
-            select(order, middle[k], start, stop, start + half)
-            cost = girth(order, lower, upper, start, start + half) + girth(
-                order, lower, upper, start + half, stop
-            )
-            if cost < cheapest:
-                cheapest, axis = cost, k
-        if axis != 2:
-            select(order, middle[axis], start, stop, start + half)
-        stack.append((start, half))
-        stack.append((start + half, half))
-    return order
-
-
-@part
-def permute(x, y, z, axis):
-    """Coordinates with `axis` last (cyclic)."""
-    if axis == 0:
-        return y, z, x
-    if axis == 1:
-        return z, x, y
-    return x, y, z
-
-
-@jit
-def crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
-    """Whether a line goes through a triangle: watertight, shared edges decide alike on both sides.
-
-    Source: Woop, Benthin, Wald, J. Comput. Graph. Tech. 2 (2013) 65, in float64.
-    """
-    ax, ay, az = permute(corners[tri, 0] - x, corners[tri, 1] - y, corners[tri, 2] - z, axis)
-    bx, by, bz = permute(corners[tri, 3] - x, corners[tri, 4] - y, corners[tri, 5] - z, axis)
-    cx, cy, cz = permute(corners[tri, 6] - x, corners[tri, 7] - y, corners[tri, 8] - z, axis)
-    ax, ay = ax - shear_x * az, ay - shear_y * az
-    bx, by = bx - shear_x * bz, by - shear_y * bz
-    cx, cy = cx - shear_x * cz, cy - shear_y * cz
-    u = cx * by - cy * bx
-    v = ax * cy - ay * cx
-    w = bx * ay - by * ax
-    if (u < 0.0 or v < 0.0 or w < 0.0) and (u > 0.0 or v > 0.0 or w > 0.0):
-        return False
-    return u + v + w != 0.0
-
-
-@part
-def inset(planes, tri, x, y, z):
-    """Distance inside the nearest edge of a triangle; negative outside."""
-    a = planes[tri, 4] * x + planes[tri, 5] * y + planes[tri, 6] * z + planes[tri, 7]
-    b = planes[tri, 8] * x + planes[tri, 9] * y + planes[tri, 10] * z + planes[tri, 11]
-    c = planes[tri, 12] * x + planes[tri, 13] * y + planes[tri, 14] * z + planes[tri, 15]
-    least = a if a < b else b
-    return least if least < c else c
-
-
-@part
-def enters(lower, upper, node, x, y, z, ix, iy, iz, nearest):
-    """Path at which a ray enters a box, or infinity if it does not before `nearest`."""
-    if lower[node, 0] > upper[node, 0]:  # an empty one
-        return np.inf
-    ax, bx = (lower[node, 0] - x) * ix, (upper[node, 0] - x) * ix
-    ay, by = (lower[node, 1] - y) * iy, (upper[node, 1] - y) * iy
-    az, bz = (lower[node, 2] - z) * iz, (upper[node, 2] - z) * iz
-    begin, end = min(ax, bx), max(ax, bx)
-    begin, end = max(begin, min(ay, by)), min(end, max(ay, by))
-    begin, end = max(begin, min(az, bz)), min(end, max(az, bz))
-    return begin if begin <= end and end >= -1e-9 and begin <= nearest else np.inf
-
-
-@part
-def inverse(component):
-    """1 / component, finite: a slab that a ray runs along is entered nowhere or everywhere."""
-    return 1.0 / component if abs(component) > 1e-200 else 1e200
-
-
-@jit
-def decide(
-    x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper, tolerance
-):  # fmt: skip
-    """First hit of a ray in float64 alone, by a bounding volume tree; triangle -1 if none before `limit`.
-
-    `skip` is the triangle just left, `guess` one that is likely hit (or below 0). A face that
-    the start touches is hit at 0 if the ray goes on through it: seen from the region it travels
-    in (`side` = +-1: before or behind oriented faces), or, for side = 0, in the sense in which
-    it came, along b. side = 2: a source, which touches nothing.
-    """
-    magnitude = max(abs(dx), abs(dy), abs(dz))
-    axis = 0 if abs(dx) == magnitude else (1 if abs(dy) == magnitude else 2)
-    px, py, pz = permute(dx, dy, dz, axis)
-    shear_x, shear_y = px / pz, py / pz
-    ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
-    nearest, best = limit, -1
-    leaves = len(lower) // 2
-    stack = np.empty(64, np.int64)
-    stack[0] = 1
-    depth = 1
-    first = guess >= 0 and guess != skip
-    while depth > 0:
-        depth -= 1
-        node = stack[depth]
-        if first:  # bounds the search before it begins
-            begin, end = -1, 0
-            depth += 1
-        else:
-            if enters(lower, upper, node, x, y, z, ix, iy, iz, nearest) == np.inf:
-                continue
-            if node < leaves:
-                left = enters(lower, upper, 2 * node, x, y, z, ix, iy, iz, nearest)
-                right = enters(lower, upper, 2 * node + 1, x, y, z, ix, iy, iz, nearest)
-                near = 2 * node if left <= right else 2 * node + 1
-                if max(left, right) < np.inf:
-                    stack[depth] = 4 * node + 1 - near
-                    depth += 1
-                if min(left, right) < np.inf:
-                    stack[depth] = near
-                    depth += 1
-                continue
-            begin = LEAF * (node - leaves)
-            end = begin + LEAF
-        for slot in range(begin, end):
-            tri = guess if first else order[slot]
-            if tri < 0 or tri == skip:
-                continue
-            nx, ny, nz = planes[tri, 0], planes[tri, 1], planes[tri, 2]
-            height = nx * x + ny * y + nz * z + planes[tri, 3]
-            facing = nx * dx + ny * dy + nz * dz
-            if side != 2 and abs(height) <= tolerance and inset(planes, tri, x, y, z) >= -tolerance:
-                onward = facing * side < 0.0 if side != 0 else facing * (nx * bx + ny * by + nz * bz) > 0.0
-                if not onward:
-                    continue
-                path = 0.0
-            else:
-                if facing == 0.0:
-                    continue
-                path = -height / facing
-                if not (path > 0.0 and path <= nearest):
-                    continue
-                if not crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
-                    continue
-            if path < nearest or (path == nearest and tri < best):
-                nearest, best = path, tri
-        first = False
-    return nearest, best
-
-
-@jit
 def doubted(
-    x, y, z, dx, dy, dz, row, own, guess, limit, leaving, last, normal, straight, first, oriented, frame,
+    x, y, z, dx, dy, dz, row, own, guess, limit, leaving, last, state, straight, first, oriented, frame,
     planes, corners, order, lower, upper,
 ):  # fmt: skip
     """Exact hit of a doubtful ray before `limit`: path, triangle, a point inside its edges."""
@@ -352,9 +169,9 @@ def doubted(
     else:
         side = 0
         if not straight[row]:  # it was reflected: undo that
-            bx -= 2.0 * leaving * normal[row, 0]
-            by -= 2.0 * leaving * normal[row, 1]
-            bz -= 2.0 * leaving * normal[row, 2]
+            bx -= 2.0 * leaving * state[row, NX]
+            by -= 2.0 * leaving * state[row, NY]
+            bz -= 2.0 * leaving * state[row, NZ]
     path, tri = decide(
         x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
         tolerance,
@@ -373,16 +190,16 @@ def doubted(
 
 @jit
 def measure(
-    sent, count, prim, origin, direction, last, normal, edge, straight, first, stop, oriented, closed, frame,
-    planes, corners, order, lower, upper, path, triangle, point, facet, rim,
+    sent, count, prim, state, last, straight, first, stop, oriented, closed, frame, planes, gentle, corners,
+    order, lower, upper, met, triangle,
 ):  # fmt: skip
     """Turn Embree's triangle numbers into float64 hits; decide the doubtful ones exactly.
 
-    Keeps a hit where it is nearer than `path` (metres). Returns how many were doubtful.
+    Keeps a hit where it is nearer than the one in `met`. Returns how many were doubtful.
     """
     # one long loop: numba counts references of every array that a function inside it takes
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
-    unscale = 1.0 / scale
+    unscale, sure = 1.0 / scale, 4.0 * frame[6]
     doubtful = 0
     for i in range(count):
         row = np.uintp(sent[i])
@@ -391,11 +208,11 @@ def measure(
         own = first <= left < stop
         if guess == -1 and not own:
             continue
-        dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
-        x = (origin[row, 0] - cx) * scale
-        y = (origin[row, 1] - cy) * scale
-        z = (origin[row, 2] - cz) * scale
-        leaving = normal[row, 0] * dx + normal[row, 1] * dy + normal[row, 2] * dz
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        x = (state[row, OX] - cx) * scale
+        y = (state[row, OY] - cy) * scale
+        z = (state[row, OZ] - cz) * scale
+        leaving = state[row, NX] * dx + state[row, NY] * dy + state[row, NZ] * dz
         distance, px, py, pz, inside = np.inf, x, y, z, 0.0
         if guess >= 0:
             k = np.uintp(guess)
@@ -404,11 +221,13 @@ def measure(
             distance = -height / facing
             px, py, pz = x + distance * dx, y + distance * dy, z + distance * dz
             inside = inset(planes, k, px, py, pz)
-            doubt = not (inside > MARGIN and distance > MARGIN and distance < 1e300)
-            doubt |= own and (guess == left - first or (oriented and facing * leaving >= 0.0))
+            doubt = not (distance > MARGIN and distance < 1e300)
+            if inside <= MARGIN:
+                doubt |= not (inside > sure and abs(facing) > STEEP and gentle[k])
+            doubt |= own and (guess == left - first or (closed and facing * leaving >= 0.0))
         else:
             doubt = guess == -2 or (own and closed and leaving < 0.0)
-        near = own and edge[row] < frame[5]
+        near = own and state[row, EDGE] < frame[5] and not (abs(leaving) > STEEP and gentle[left - first])
         if doubt or near:
             # near an edge the step off the surface may have jumped something; beyond it Embree is
             # right, if the step went along the ray
@@ -416,24 +235,24 @@ def measure(
             local = not doubt and abs(leaving) > GRAZING
             exact, tri, ex, ey, ez, rest = doubted(
                 x, y, z, dx, dy, dz, row, own, np.int64(-1) if local else guess,
-                2.0 * MARGIN if local else np.inf, leaving, last, normal, straight, first, oriented, frame,
+                2.0 * MARGIN if local else np.inf, leaving, last, state, straight, first, oriented, frame,
                 planes, corners, order, lower, upper,
             )  # fmt: skip
             if tri >= 0 or not local:
                 distance, guess, px, py, pz, inside = exact, tri, ex, ey, ez, rest
-        if guess < 0 or not distance * unscale < path[row]:
+        if guess < 0 or not distance * unscale < met[row, PATH]:
             continue
         # rounding left the point a little off its plane: put it back
         k = np.uintp(guess)
         nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
         height = nx * px + ny * py + nz * pz + planes[k, 3]
-        path[row] = distance * unscale
+        met[row, PATH] = distance * unscale
         triangle[row] = first + guess
-        point[row, 0] = cx + (px - height * nx) * unscale
-        point[row, 1] = cy + (py - height * ny) * unscale
-        point[row, 2] = cz + (pz - height * nz) * unscale
-        facet[row, 0], facet[row, 1], facet[row, 2] = nx, ny, nz
-        rim[row] = inside
+        met[row, PX] = cx + (px - height * nx) * unscale
+        met[row, PY] = cy + (py - height * ny) * unscale
+        met[row, PZ] = cz + (pz - height * nz) * unscale
+        met[row, FX], met[row, FY], met[row, FZ] = nx, ny, nz
+        met[row, RIM] = inside
     return doubtful
 
 
@@ -453,9 +272,92 @@ def lands(screen, path, x, y, z, dx, dy, dz):
 
 
 @jit
+def rebound(
+    count, prim, state, key, ray, last, bounces, straight, oriented, closed,
+    frame, planes, gentle, corners, order, lower, upper, owner, surfaces, screen, has_screen, max_bounces,
+    end_origin, end_direction, end_length, end_key, end_ray, end_bounces, end_fate, ended, first, origin32, direction32,
+):  # fmt: skip
+    """`measure`, `interact` and `aim` in one for a single body of ideal mirrors that all rays just left.
+
+    Returns how many rays go on, how many have ended, and how many hits were doubtful.
+    """
+    cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
+    unscale, sure = 1.0 / scale, 4.0 * frame[6]
+    base = np.uint64(2 * surfaces + 1)
+    kept, doubtful = 0, 0
+    for row in range(count):
+        guess = np.int64(prim[row])
+        gx, gy, gz = state[row, OX], state[row, OY], state[row, OZ]
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        x, y, z = (gx - cx) * scale, (gy - cy) * scale, (gz - cz) * scale
+        leaving = state[row, NX] * dx + state[row, NY] * dy + state[row, NZ] * dz
+        distance, px, py, pz, inside = np.inf, x, y, z, 0.0
+        if guess >= 0:
+            k = np.uintp(guess)
+            facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
+            height = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3]
+            distance = -height / facing
+            px, py, pz = x + distance * dx, y + distance * dy, z + distance * dz
+            inside = inset(planes, k, px, py, pz)
+            doubt = not (distance > MARGIN and distance < 1e300)
+            if inside <= MARGIN:
+                doubt |= not (inside > sure and abs(facing) > STEEP and gentle[k])
+            doubt |= guess == last[row] or (closed and facing * leaving >= 0.0)
+        else:
+            doubt = guess == -2 or (closed and leaving < 0.0)
+        if doubt or (state[row, EDGE] < frame[5] and not (abs(leaving) > STEEP and gentle[last[row]])):
+            doubtful += 1
+            local = not doubt and abs(leaving) > GRAZING  # see `measure`
+            exact, tri, ex, ey, ez, rest = doubted(
+                x, y, z, dx, dy, dz, row, True, np.int64(-1) if local else guess,
+                2.0 * MARGIN if local else np.inf, leaving, last, state, straight, 0, oriented, frame,
+                planes, corners, order, lower, upper,
+            )  # fmt: skip
+            if tri >= 0 or not local:
+                distance, guess, px, py, pz, inside = exact, tri, ex, ey, ez, rest
+        path = distance * unscale
+        reach = np.inf
+        if has_screen:
+            reach = lands(screen, path if guess >= 0 else np.inf, gx, gy, gz, dx, dy, dz)
+        fate = ALIVE
+        if reach < np.inf:
+            fate = DETECTED
+        elif guess < 0:
+            fate, reach = LEFT, 0.0
+        elif bounces[row] >= max_bounces:
+            fate, reach = TRUNCATED, 0.0
+        if fate != ALIVE:
+            end = ray[row] - first
+            end_origin[end, 0] = gx + reach * dx
+            end_origin[end, 1] = gy + reach * dy
+            end_origin[end, 2] = gz + reach * dz
+            end_direction[end, 0], end_direction[end, 1], end_direction[end, 2] = dx, dy, dz
+            end_length[end], end_key[end], end_ray[end] = state[row, WAY] + reach, key[row], ray[row]
+            end_bounces[end], end_fate[end] = bounces[row], fate
+            ended += 1
+            continue
+        k = np.uintp(guess)
+        nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
+        height = nx * px + ny * py + nz * pz + planes[k, 3]
+        x, y, z = px - height * nx, py - height * ny, pz - height * nz
+        dx, dy, dz = bounced(dx, dy, dz, nx, ny, nz)
+        state[kept, OX], state[kept, OY], state[kept, OZ] = cx + x * unscale, cy + y * unscale, cz + z * unscale
+        state[kept, DX], state[kept, DY], state[kept, DZ] = dx, dy, dz
+        state[kept, NX], state[kept, NY], state[kept, NZ] = nx, ny, nz
+        state[kept, WAY], state[kept, EDGE], last[kept] = state[row, WAY] + path, inside, guess
+        key[kept] = key[row] * base + np.uint64(2 * owner[k] + 1)
+        ray[kept], bounces[kept] = ray[row], bounces[row] + 1
+        x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz)
+        origin32[kept, 0], origin32[kept, 1], origin32[kept, 2] = x, y, z
+        direction32[kept, 0], direction32[kept, 1], direction32[kept, 2] = dx, dy, dz
+        kept += 1
+    return kept, ended, doubtful
+
+
+@jit
 def interact(
-    count, origin, direction, normal, length, edge, lost, amplitude, key, ray, last, bounces, reflections,
-    straight, serial, path, triangle, point, facet, rim, owner, reflection, transmission, plain, screen,
+    count, state, lost, amplitude, key, ray, last, bounces, reflections, straight, serial, met, triangle, owner,
+    reflection, transmission, plain, screen,
     has_screen, max_bounces, faint, end_origin, end_direction, end_length, end_lost, end_amplitude, end_key,
     end_ray, end_bounces, end_reflections, end_fate, end_serial, ended, first, serials,
 ):  # fmt: skip
@@ -469,9 +371,9 @@ def interact(
     base = np.uint64(2 * len(reflection) + 1)
     kept, born = 0, 0
     for row in range(count):
-        x, y, z = origin[row, 0], origin[row, 1], origin[row, 2]
-        dx, dy, dz = direction[row, 0], direction[row, 1], direction[row, 2]
-        way, here, steps = length[row], key[row], bounces[row]
+        x, y, z = state[row, OX], state[row, OY], state[row, OZ]
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        way, here, steps = state[row, WAY], key[row], bounces[row]
         before, gone, mirrored = 1.0 + 0.0j, 0.0, steps
         if not plain:
             before, gone, mirrored = amplitude[row], lost[row], reflections[row]
@@ -479,7 +381,7 @@ def interact(
         through = False
         reach = np.inf
         if has_screen:
-            reach = lands(screen, path[row], x, y, z, dx, dy, dz)
+            reach = lands(screen, met[row, PATH], x, y, z, dx, dy, dz)
         if reach < np.inf:
             x, y, z = x + reach * dx, y + reach * dy, z + reach * dz
             way += reach
@@ -490,16 +392,12 @@ def interact(
             fate = TRUNCATED
         else:
             surface = owner[np.uintp(triangle[row])]
-            x, y, z = point[row, 0], point[row, 1], point[row, 2]
-            nx, ny, nz = facet[row, 0], facet[row, 1], facet[row, 2]
-            way += path[row]
+            x, y, z = met[row, PX], met[row, PY], met[row, PZ]
+            nx, ny, nz = met[row, FX], met[row, FY], met[row, FZ]
+            way += met[row, PATH]
             steps += 1
             here = here * base + np.uint64(2 * surface + 1)
-            along = 2.0 * (nx * dx + ny * dy + nz * dz)
-            rx, ry, rz = dx - along * nx, dy - along * ny, dz - along * nz
-            # one Newton step keeps the length at 1 over thousands of bounces
-            scale = 1.5 - 0.5 * (rx * rx + ry * ry + rz * rz)
-            rx, ry, rz = rx * scale, ry * scale, rz * scale
+            rx, ry, rz = bounced(dx, dy, dz, nx, ny, nz)
             if not plain:
                 r, t = reflection[surface], transmission[surface]
                 r2, t2 = r.real * r.real + r.imag * r.imag, t.real * t.real + t.imag * t.imag
@@ -508,10 +406,10 @@ def interact(
                 if r2 > 0.0 and t2 > 0.0:
                     new = count + born
                     born += 1
-                    origin[new, 0], origin[new, 1], origin[new, 2] = x, y, z
-                    direction[new, 0], direction[new, 1], direction[new, 2] = dx, dy, dz
-                    normal[new, 0], normal[new, 1], normal[new, 2] = nx, ny, nz
-                    length[new], edge[new], lost[new] = way, rim[row], 0.0
+                    state[new, OX], state[new, OY], state[new, OZ] = x, y, z
+                    state[new, DX], state[new, DY], state[new, DZ] = dx, dy, dz
+                    state[new, NX], state[new, NY], state[new, NZ] = nx, ny, nz
+                    state[new, WAY], state[new, EDGE], lost[new] = way, met[row, RIM], 0.0
                     amplitude[new], key[new], ray[new] = before * t, here + np.uint64(1), ray[row]
                     last[new], bounces[new], reflections[new] = triangle[row], steps, mirrored
                     straight[new], serial[new] = True, serials
@@ -545,10 +443,10 @@ def interact(
                     fate = FAINT
             dx, dy, dz = rx, ry, rz
             if fate == ALIVE:
-                origin[kept, 0], origin[kept, 1], origin[kept, 2] = x, y, z
-                direction[kept, 0], direction[kept, 1], direction[kept, 2] = dx, dy, dz
-                normal[kept, 0], normal[kept, 1], normal[kept, 2] = nx, ny, nz
-                length[kept], edge[kept], last[kept] = way, rim[row], triangle[row]
+                state[kept, OX], state[kept, OY], state[kept, OZ] = x, y, z
+                state[kept, DX], state[kept, DY], state[kept, DZ] = dx, dy, dz
+                state[kept, NX], state[kept, NY], state[kept, NZ] = nx, ny, nz
+                state[kept, WAY], state[kept, EDGE], last[kept] = way, met[row, RIM], triangle[row]
                 key[kept], ray[kept], bounces[kept], serial[kept] = here, ray[row], steps, serial[row]
                 if not plain:
                     lost[kept], amplitude[kept] = gone, before
@@ -565,23 +463,23 @@ def interact(
         ended += 1
     for i in range(born):  # kept <= count: in order, nothing is overwritten before it is read
         new, to = count + i, kept + i
-        for k in range(3):
-            origin[to, k], direction[to, k], normal[to, k] = origin[new, k], direction[new, k], normal[new, k]
-        length[to], edge[to], lost[to], amplitude[to] = length[new], edge[new], lost[new], amplitude[new]
+        state[to] = state[new]
+        lost[to], amplitude[to] = lost[new], amplitude[new]
         key[to], ray[to], last[to], bounces[to] = key[new], ray[new], last[new], bounces[new]
         reflections[to], straight[to], serial[to] = reflections[new], straight[new], serial[new]
     return kept + born, born, ended, serials
 
 
 @jit
-def gather(row, column, length, amplitude, period, total):
+def gather(pixel, length, amplitude, period, total):
     """Add amplitude * exp(2 pi i length / period) to the pixels, in the order of the rays.
 
     The remainder is exact, so long paths cost no digits.
     """
     rows, columns = total.shape
     for i in range(len(length)):
-        v, u = int(row[i]), int(column[i])
+        v, u = int(pixel[i, 0]), int(pixel[i, 1])
         turn = 2.0 * np.pi * ((length[i] % period) / period)
         phasor = complex(np.cos(turn), np.sin(turn))
-        total[min(v, rows - 1), min(u, columns - 1)] += amplitude[i] * phasor
+        # a point on the rim may round to the pixel beyond it
+        total[min(max(v, 0), rows - 1), min(max(u, 0), columns - 1)] += amplitude[i] * phasor

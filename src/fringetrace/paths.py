@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -76,9 +77,6 @@ class Paths:
         Power absorbed on the way, relative to unit amplitude.
     key : (m,) uint64
         Names the sequence of surfaces and branches; equal sequences have equal keys.
-    pixel : (m, 2) float64
-        CCD coordinates (row, column) in pixels, pixel [i, j] spans [i, i+1) x [j, j+1); NaN if
-        not detected.
     area : float or None, m^2
         Beam cross-section that each ray stands for.
     incident : float
@@ -105,7 +103,6 @@ class Paths:
     amplitude: ComplexArray
     lost: FloatArray
     key: npt.NDArray[np.uint64]
-    pixel: FloatArray
     area: float | None
     incident: float
     segments: int
@@ -139,6 +136,18 @@ class Paths:
     def detected(self) -> Paths:
         """The paths that reached the CCD."""
         return self.where(self.fate == Fate.DETECTED)
+
+    @property
+    def pixel(self) -> FloatArray:
+        """(m, 2) float64: CCD coordinates (row, column) in pixels; NaN where not detected.
+
+        Pixel [i, j] spans [i, i+1) x [j, j+1).
+        """
+        pixel = np.full((len(self), 2), np.nan)
+        if self.ccd is not None:
+            seen = np.flatnonzero(self.fate == Fate.DETECTED)
+            pixel[seen] = pixels(self.ccd, self.origin[seen])
+        return pixel
 
     def sequence(self, row: int) -> list[tuple[int, bool]]:
         """Surfaces that a path met and whether it went through them (decoded from its key).
@@ -240,7 +249,7 @@ class Paths:
 
 COLUMNS = (
     "ray", "fate", "bounces", "reflections", "length", "origin", "direction", "amplitude", "lost", "key",
-    "pixel", "surface", "triangle", "points",
+    "surface", "triangle", "points",
 )  # fmt: skip
 
 
@@ -289,13 +298,11 @@ def project(paths: Paths, ccd: CCD) -> Paths:
     width, height = ccd.size
     x, y = offset @ u, offset @ v
     seen = ahead & (abs(x) <= 0.5 * width) & (x < 0.5 * width) & (abs(y) <= 0.5 * height) & (y < 0.5 * height)
-    pixel = np.where(seen[:, None], pixels(ccd, point), np.nan)
     return replace(
         paths,
         fate=np.where(seen, np.int8(Fate.DETECTED), paths.fate),
         length=np.where(seen, paths.length + reach, paths.length),
         origin=np.where(seen[:, None], point, paths.origin),
-        pixel=pixel,
         ccd=ccd,
     )
 
@@ -326,7 +333,7 @@ def join(parts: Sequence[Paths]) -> Paths:
     """
     if len(parts) == 1:
         return parts[0]
-    columns: dict[str, Array] = {}
+    columns: dict[str, Any] = {}
     for name in COLUMNS:
         arrays = [getattr(part, name) for part in parts]
         if arrays[0] is None:

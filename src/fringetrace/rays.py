@@ -172,16 +172,13 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
 class Batch:
     """Rays under way, one row each, changed in place by the bounce passes. Lengths in metres.
 
-    `last` is the triangle last left (-1: none), `normal` and `edge` its normal and the distance of
-    the start from its nearest edge (unit box); `straight` says that the ray went through it.
-    `lost` is the power given off on the way, `serial` numbers the paths as they are born.
+    `state` has the columns that `kernels` names: origin, direction, normal of the face last left,
+    optical path, distance of the start from that face's edge. `last` is the triangle last left
+    (-1: none); `straight` says that the ray went through it. `lost` is the power given off on the
+    way, `serial` numbers the paths as they are born.
     """
 
-    origin: FloatArray
-    direction: FloatArray
-    normal: FloatArray
-    length: FloatArray
-    edge: FloatArray
+    state: FloatArray
     lost: FloatArray
     amplitude: ComplexArray
     key: npt.NDArray[np.uint64]
@@ -219,13 +216,9 @@ TYPES = {
 
 def blank(kind: type[Table], rows: int) -> Table:
     """Room for so many rows, not filled in."""
-    wide = ("origin", "direction", "normal")
-    return kind(
-        **{
-            column.name: np.empty((rows, 3) if column.name in wide else rows, TYPES.get(column.name, np.float64))
-            for column in fields(kind)
-        }
-    )
+    wide = {"origin": (rows, 3), "direction": (rows, 3), "state": (rows, 12)}
+    names = [column.name for column in fields(kind)]
+    return kind(**{name: np.empty(wide.get(name, rows), TYPES.get(name, np.float64)) for name in names})
 
 
 def part(table: Table, start: int, stop: int) -> Table:
@@ -253,13 +246,15 @@ def start(state: Batch, rays: Rays, first: int) -> None:
         Number of the first of them.
     """
     n = len(rays)
-    state.origin[:n] = rays.origin
-    state.direction[:n] = rays.direction
-    state.length[:n] = rays.length
+    state.state[:n, :3] = rays.origin
+    state.state[:n, 3:6] = rays.direction
+    state.state[:n, 6:9] = 0.0
+    state.state[:n, 9] = rays.length
+    state.state[:n, 10:] = 0.0
     state.amplitude[:n] = 1.0  # of the path alone: the launched amplitude is multiplied in at the end
     state.ray[:n] = np.arange(first, first + n)
     state.serial[:n] = np.arange(n)
     state.last[:n] = -1
-    for column in (state.normal, state.edge, state.lost, state.key, state.bounces, state.reflections):
+    for column in (state.lost, state.key, state.bounces, state.reflections):
         column[:n] = 0
     state.straight[:n] = False

@@ -13,8 +13,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from fringetrace.engine import Engine, Hits, build, find
-from fringetrace.paths import Fate, Paths, join, pixels
+from fringetrace.engine import Engine, Hits, Limits, aim, build, find, follow
+from fringetrace.paths import Fate, Paths, join
 from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.vectors import frame
@@ -163,7 +163,7 @@ def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, ol
     first = len(record.points[0])
     serials = np.concatenate([before["serial"][met], np.arange(first, first + len(parents))])
     rows = np.concatenate([np.flatnonzero(met), parents])
-    record.add(before["serial"][parents], serials, hits.triangle[rows], hits.point[rows])
+    record.add(before["serial"][parents], serials, hits.triangle[rows], hits.met[rows, 1:4])
 
 
 def _advance(plan: Plan, space: Workspace, ends: Ends, first: int, stop: int) -> Chunk:
@@ -178,7 +178,14 @@ def _advance(plan: Plan, space: Workspace, ends: Ends, first: int, stop: int) ->
     ordered = not (plan.splits or plan.record)
     count, ended, serials, segments, doubtful = len(rays), 0, len(rays), 0, 0
     passed = plan.passed
+    limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
+    simple = plan.plain and ordered and len(plan.engine.bodies) == 1
     while count:
+        if simple and segments:
+            segments += count
+            count, _, unsure = follow(plan.engine, space.state, count, space.hits, ends, limits)
+            doubtful += unsure
+            continue
         if plan.splits and 2 * count > len(space.state.ray):
             space.state, space.hits = grown(space.state, 4 * count), Hits.blank(4 * count)
         if not ordered and ended + 2 * count > len(ends.ray):
@@ -187,14 +194,18 @@ def _advance(plan: Plan, space: Workspace, ends: Ends, first: int, stop: int) ->
         segments += count
         doubtful += find(plan.engine, state, count, hits, passed)
         passed = frozenset()
-        before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()} if record else {}
+        before: dict[str, Array] = {}
+        if record is not None:
+            before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()}
         old = ended
         count, _, ended, serials = kernels.interact(
-            count, *vars(state).values(), hits.path, hits.triangle, hits.point, hits.facet, hits.rim,
+            count, *vars(state).values(), hits.met, hits.triangle,
             plan.engine.owner, plan.reflection, plan.transmission, plan.plain, plan.screen,
             plan.ccd is not None, plan.max_bounces, plan.faint, *vars(ends).values(), ended,
             first if ordered else -1, serials,
         )  # fmt: skip
+        if simple:
+            aim(plan.engine, state, count, hits, 0, True)
         if record is not None:
             _noted(record, plan, before, part(ends, 0, ended), old, hits)
     return Chunk(ends, ended, rays, segments, doubtful, record)
@@ -229,10 +240,6 @@ def _paths(
     else:
         reflections, lost = ends.reflections, ends.lost * np.abs(relative) ** 2
         amplitude = relative * ends.amplitude
-    pixel = np.full((len(ends.ray), 2), np.nan)
-    if plan.ccd is not None:
-        seen = np.flatnonzero(ends.fate == Fate.DETECTED)
-        pixel[seen] = pixels(plan.ccd, ends.origin[seen])
     return Paths(
         ray=ends.ray,
         fate=ends.fate,
@@ -244,7 +251,6 @@ def _paths(
         amplitude=amplitude,
         lost=lost,
         key=ends.key,
-        pixel=pixel,
         area=plan.source.area,
         incident=float((np.abs(launched) ** 2).sum()),
         segments=segments,

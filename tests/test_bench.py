@@ -1,0 +1,162 @@
+"""What a bench records: traced once, summed by arm, stepped without a new trace."""
+
+import math
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import fringetrace as ft
+from fringetrace import instruments, mm, nm
+from fringetrace.bench import Bench, centred, path_slope, pixel_centres
+from fringetrace.shapes import plate
+
+HENE = 632.8 * nm
+# Path lengths of some 50 mm in float64, in radians at this wavelength, with room for a few roundings.
+PHASE = 1e-8
+
+
+@pytest.fixture
+def bench():
+    return instruments.michelson(
+        plate(8 * mm, 8 * mm), aperture=6 * mm, pixels=(6, 8), reference_tilt=(2e-4, -1e-4)
+    )
+
+
+def test_it_is_traced_once(bench):
+    done = []
+    paths = bench.trace(progress=lambda *counts: done.append(counts), threads=1)
+    assert done == [(48, 48)]
+    assert bench.trace(progress=lambda *counts: done.append(counts)) is paths
+    assert len(done) == 1
+
+
+def test_the_fields_of_the_arms_add_up_to_the_field(bench):
+    sample, reference = bench.fields(HENE)
+    np.testing.assert_allclose(abs(sample), 0.5, rtol=1e-12)
+    np.testing.assert_allclose(abs(reference), 0.5, rtol=1e-12)
+    np.testing.assert_allclose(bench.field(HENE), sample + reference, rtol=1e-12)
+    np.testing.assert_allclose(bench.field(HENE, math.pi / 3), sample + np.exp(1j * math.pi / 3) * reference)
+    np.testing.assert_allclose(bench.interferogram(HENE), abs(sample + reference) ** 2, rtol=1e-12)
+    np.testing.assert_allclose(bench.interferogram(HENE, modulus=True), abs(sample + reference), rtol=1e-12)
+
+
+def test_fields_are_kept_for_the_last_wavelength(bench):
+    first = bench.fields(HENE)
+    assert bench.fields(HENE) is first
+    assert not np.allclose(bench.fields(532 * nm), first)
+    np.testing.assert_array_equal(bench.fields(HENE), first)
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_streamed_fields_are_the_same(bench, threads):
+    np.testing.assert_allclose(
+        bench.stream_fields(HENE, threads=threads), bench.fields(HENE), rtol=0, atol=1e-12
+    )
+
+
+def test_streamed_fields_keep_no_paths(bench):
+    seen = []
+    bench.stream_fields(HENE, progress=lambda *counts: seen.append(counts))
+    assert bench.derived == {}
+    assert seen
+
+
+def test_light_that_meets_the_reference_twice_is_stepped_twice(bench):
+    orders = np.array([1.0, 2.0, 0.5])[:, None, None] * np.ones((3, *bench.ccd.shape))
+    bench.derived.update(wavelength=HENE, fields=orders)
+    np.testing.assert_allclose(bench.field(HENE, math.pi / 2), 1.0 + 2.0j - 0.5)
+
+
+@pytest.mark.parametrize("steps", [0, 2])
+def test_two_steps_are_refused(bench, steps):
+    with pytest.raises(ValueError, match=f"phase steps: expected at least 3, got {steps}"):
+        bench.phase_steps(HENE, steps)
+
+
+def test_a_wavelength_that_is_none_is_refused(bench):
+    with pytest.raises(ValueError, match="wavelength: expected a positive length"):
+        bench.interferogram(0.0)
+
+
+def test_a_height_needs_light_from_both_arms():
+    beside = plate(1 * mm, 1 * mm).moved((10 * mm, 0.0, 0.0))
+    dark = instruments.michelson(beside, aperture=6 * mm, pixels=(6, 8))
+    assert np.isnan(dark.wrapped(HENE)).all()
+    with pytest.raises(ValueError, match="height: expected pixels with light from both arms, got none"):
+        dark.height(HENE)
+
+
+def test_the_carrier_is_the_phase_of_a_flat_sample(bench):
+    flat = ft.phase.wrap(bench.wrapped(HENE) - bench.carrier(HENE))
+    np.testing.assert_allclose(flat, 0.0, atol=PHASE)
+    np.testing.assert_allclose(bench.carrier(HENE)[[0, -1], [0, -1]].sum(), 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("steps", [3, 4, 5, 8])
+def test_any_number_of_steps_gives_the_same_height(bench, steps):
+    np.testing.assert_allclose(bench.height(HENE, steps), 0.0, atol=PHASE * HENE)
+
+
+def test_it_survives_a_pickle_without_its_paths(bench):
+    image = bench.interferogram(HENE)
+    copy = pickle.loads(pickle.dumps(bench))
+    assert copy.derived == {}
+    np.testing.assert_array_equal(copy.interferogram(HENE), image)
+
+
+def test_sampled_paths_are_few_and_recorded(bench):
+    paths = bench.sampled((2, 3))
+    assert paths.ray.max() == 5
+    assert paths.polyline(0).shape[1] == 3
+    assert bench.derived == {}
+
+
+def test_rays_are_continued_to_the_centre_of_their_part_of_a_pixel():
+    """A plane wave, sampled anywhere: after centring its phase is that of the centres, exactly."""
+    ccd = ft.CCD([0, 0, 0], [0, 0, -1], [0, 1, 0], pitch=1 * mm, shape=(4, 5))
+    random = np.random.default_rng(7)
+    slope = np.array([0.3, -0.2, math.sqrt(1 - 0.13)])
+    at = np.column_stack([random.uniform(-2.4, 2.4, 50), random.uniform(-1.9, 1.9, 50), np.full(50, -1)]) * mm
+    floor = ft.Scene([ft.Surface(plate(1 * mm, 1 * mm).moved((1.0, 1.0, 1.0)), ft.Mirror())])
+    starts = at - slope * 1e-3 * random.uniform(1, 2, (50, 1))
+    paths = ft.trace(floor, ft.Rays(starts, np.tile(slope, (50, 1)), length=starts @ slope), ccd).detected
+    assert len(paths) > 30
+    for parts in (1, 3):
+        moved = centred(paths, parts)
+        cell = (np.floor(paths.pixel * parts) + 0.5) / parts * mm - [2 * mm, 2.5 * mm]
+        wave = cell[:, 1] * slope[0] + cell[:, 0] * slope[1]
+        np.testing.assert_allclose(moved.length, wave, rtol=0, atol=1e-15)
+
+
+def test_paths_without_a_ccd_cannot_be_centred(bench):
+    with pytest.raises(ValueError, match="centred: expected paths traced onto a CCD"):
+        centred(replace(bench.trace(), ccd=None))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05))
+def test_the_slope_of_a_tilted_wave_is_that_of_the_reflected_ray(tilt_x, tilt_y):
+    angle = math.hypot(tilt_x, tilt_y)
+    normal = np.array([0.0, 0.0, 1.0])
+    if angle > 0.0:
+        across = np.array([tilt_x, tilt_y]) / angle
+        normal = np.array([*(math.sin(angle) * across), math.cos(angle)])
+    down = np.array([0.0, 0.0, -1.0])
+    reflected = down - 2 * (down @ normal) * normal
+    np.testing.assert_allclose(path_slope((tilt_x, tilt_y)), reflected[:2], rtol=1e-12, atol=1e-17)
+
+
+def test_pixel_centres_lie_about_the_middle():
+    x, y = pixel_centres((2, 3), 0.5)
+    np.testing.assert_array_equal(x, [-0.5, 0.0, 0.5])
+    np.testing.assert_array_equal(y, [-0.25, 0.25])
+
+
+def test_a_bench_can_be_built_from_any_scene(bench):
+    other = Bench(bench.scene, bench.beam, bench.ccd, reference=bench.reference)
+    assert other.tilt == (0.0, 0.0)
+    np.testing.assert_array_equal(other.carrier(HENE), 0.0)

@@ -1,0 +1,143 @@
+"""The Michelson's layout: which ray lands where, what it is made of, and every refusal."""
+
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+import fringetrace as ft
+from fringetrace import instruments, mm, nm
+from fringetrace.shapes import plate
+
+HENE = 632.8 * nm
+APERTURE = 6 * mm
+
+
+def michelson(**options):
+    options = {"sample": plate(8 * mm, 8 * mm), "aperture": APERTURE, "pixels": (6, 8), **options}
+    return instruments.michelson(options.pop("sample"), **options)
+
+
+@pytest.mark.parametrize("rays", [1, 3])
+def test_rays_start_over_the_centres_of_the_pixels(rays):
+    """Row by row; the splitter shows the beam from behind, so columns run the other way."""
+    bench = michelson(rays=rays)
+    paths = bench.trace().detected
+    assert bench.beam.shape == (6 * rays, 8 * rays)
+    row, column = np.divmod(paths.ray, 8 * rays)
+    np.testing.assert_allclose(paths.pixel[:, 0], (row + 0.5) / rays, atol=1e-9)
+    np.testing.assert_allclose(paths.pixel[:, 1], 8 - (column + 0.5) / rays, atol=1e-9)
+
+
+def test_every_ray_comes_by_both_arms():
+    paths = michelson(reference_tilt=(1e-4, 1e-4)).trace()
+    visits = paths.detected.visits(2)
+    assert np.bincount(visits).tolist() == [48, 48]
+    # r t out of each arm towards the CCD, r r or t t back to the source
+    np.testing.assert_allclose(np.abs(paths.amplitude), 0.5, rtol=1e-12)
+
+
+def test_pixels_are_square_and_the_beam_covers_the_ccd():
+    bench = michelson(pixels=(3, 12), aperture=6 * mm)
+    assert bench.ccd.pitch == pytest.approx(0.5 * mm)
+    assert bench.beam.size == pytest.approx((6 * mm, 1.5 * mm))
+    assert bench.beam.size == pytest.approx(bench.ccd.size)
+
+
+def test_the_profile_is_given_over_the_image():
+    bench = michelson(profile=lambda x, y: np.where((x > 0) & (y < 0), 1.0, 0.0))
+    expected = np.zeros((6, 8))
+    expected[:3, 4:] = 1.0
+    np.testing.assert_allclose(bench.interferogram(HENE), expected, atol=1e-9)
+
+
+def test_the_bare_ccd_is_focused_on_nothing():
+    assert michelson(focus=False).ccd.focus == 0.0
+    assert michelson(arm=40 * mm).ccd.focus == pytest.approx(80 * mm)
+
+
+def test_the_arm_grows_with_a_tall_sample():
+    assert michelson().ccd.centre[2] == pytest.approx(2 * APERTURE)
+    assert michelson(pixels=(16, 8)).ccd.centre[2] == pytest.approx(4 * APERTURE)
+    assert michelson(sample=plate(8 * mm, 8 * mm).moved((0, 0, 10 * mm))).ccd.centre[2] == pytest.approx(
+        30 * mm
+    )
+
+
+def test_a_surface_keeps_its_interface():
+    dull = ft.Surface(plate(8 * mm, 8 * mm), ft.Mirror(0.25), "silicon")
+    bench = michelson(sample=dull)
+    sample, reference = bench.fields(HENE)
+    np.testing.assert_allclose(abs(sample) / abs(reference), 0.5, rtol=1e-12)
+    assert bench.scene.index("silicon") == 1
+
+
+def test_a_sample_may_have_any_name():
+    bench = michelson(sample=ft.Surface(plate(8 * mm, 8 * mm), ft.Mirror(), "reference"))
+    assert np.bincount(bench.trace().detected.visits(bench.reference)).tolist() == [48, 48]
+
+
+def test_trimesh_is_welcome():
+    box = trimesh.creation.box(extents=(8 * mm, 8 * mm, 1 * mm))
+    box.apply_translation((0.0, 0.0, -0.5 * mm))
+    np.testing.assert_allclose(michelson(sample=box).interferogram(HENE), 1.0, atol=1e-8)
+
+
+def test_light_that_bounces_twice_in_a_groove_returns_along_its_way():
+    """A right-angled groove sends each ray back at the mirrored place; its path is that of the floor."""
+    from fringetrace.shapes import extrude
+
+    depth = 3 * mm
+    groove = extrude([(-depth, 0.0), (0.0, -depth), (depth, 0.0)], 8 * mm)
+    paths = michelson(sample=groove, aperture=4 * mm).trace().detected
+    sample = paths.where(paths.visits(2) == 0)
+    assert (sample.visits(1) == 2).all()
+    column = sample.ray % 8
+    np.testing.assert_allclose(sample.pixel[:, 1], column + 0.5, atol=1e-9)
+    flat = michelson(aperture=4 * mm, arm=float(paths.ccd.centre[2])).trace().length.min()
+    np.testing.assert_allclose(sample.length - flat, 2 * depth, atol=1e-15)
+
+
+@pytest.mark.parametrize("tilt", [(0.1, 0.0), (0.0, -0.1), (0.07, 0.07)])
+@pytest.mark.parametrize("piston", [0.0, 0.1, -0.1])
+def test_the_most_tilted_reference_still_comes_back(tilt, piston):
+    bench = michelson(reference_tilt=tilt, piston=piston * 2 * APERTURE)
+    paths = bench.trace()
+    at_mirror = paths.where(paths.visits(2) > 0)
+    # all of it went through the splitter again: half to each side
+    assert len(at_mirror) == 2 * 48
+    assert (at_mirror.bounces == 3).all()
+    assert paths.ledger().error < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"aperture": 0.0}, "michelson aperture: expected a positive length in metres, got 0"),
+        ({"aperture": math.nan}, "michelson aperture: expected a positive length in metres, got nan"),
+        ({"pixels": (0, 4)}, r"michelson pixels: expected positive whole \(rows, columns\), got \(0, 4\)"),
+        ({"pixels": (4.5, 4)}, "michelson pixels: expected positive whole"),
+        ({"pixels": (4, 4, 4)}, "michelson pixels: expected positive whole"),
+        ({"rays": 0}, "michelson rays: expected a positive whole number, got 0"),
+        ({"rays": 1.5}, "michelson rays: expected a positive whole number, got 1.5"),
+        ({"arm": 1.9 * APERTURE}, "michelson arm: expected at least 2.0 times the aperture, 0.012 m, got"),
+        ({"arm": math.nan}, "michelson arm: expected at least 2.0 times the aperture"),
+        ({"reference_tilt": (0.08, 0.08)}, "michelson reference_tilt: expected up to 0.1 rad, got"),
+        ({"reference_tilt": (math.nan, 0.0)}, "michelson reference_tilt: expected up to 0.1 rad, got"),
+        ({"piston": 2 * mm}, "michelson piston: expected up to 0.1 times the arm, 0.0012 m, got 0.002"),
+        ({"piston": math.inf}, "michelson piston: expected up to 0.1 times the arm"),
+        (
+            {"sample": plate(8 * mm, 8 * mm).moved((0, 0, 5 * mm)), "arm": 12 * mm},
+            "michelson arm: expected at least 3.0 times the sample's height, 0.015 m, got 0.012",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(options, message):
+    with pytest.raises(ValueError, match=message):
+        michelson(**options)
+
+
+def test_a_sample_that_is_no_mesh_is_refused():
+    with pytest.raises(TypeError, match="expected a mesh with vertices and faces, got str"):
+        michelson(sample="step.stl")
