@@ -36,7 +36,7 @@ def corner_cube() -> tuple[ft.Scene, ft.Beam]:
         plates.append(plate.moved(1.8 * side * axis + sign * 0.5 * side * across, wedge @ facing))
     surfaces = [ft.Surface(mesh, ft.Mirror()) for mesh in (cube, *plates)]
     start = 1.2 * side * axis
-    beam = ft.Beam(start, -axis + 0.05 * across, (0, 0, 1), (0.9 * side, 0.9 * side), (1000, 1000))
+    beam = ft.Beam(start, -axis + 0.05 * across, (0, 0, 1), (0.4 * side, 0.4 * side), (1000, 1000))
     return ft.Scene(surfaces), beam
 
 
@@ -51,23 +51,36 @@ def joint(scene: ft.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     return ((vertices - centre) * scale).astype(np.float32), faces.astype(np.int32), centre, scale
 
 
-def segments(paths: ft.Paths, centre: np.ndarray, scale: float) -> list[tuple[np.ndarray, np.ndarray]]:
+def michelson(side: int) -> ft.instruments.Bench:
+    """A Michelson of side x side rays and pixels that looks at the elevation map."""
+    relief, pitch = ft.meshes.elevation_sample(2e-6, 8e-3)
+    sample = ft.meshes.height_map(relief, pitch)
+    return ft.instruments.michelson(sample, aperture=6e-3, pixels=(side, side), reference_tilt=(200e-6, 0.0))
+
+
+Segments = list[tuple[np.ndarray, np.ndarray]]
+
+
+def segments(paths: ft.Paths, centre: np.ndarray, scale: float) -> Segments:
     """Float32 rays of every segment of recorded paths, pass by pass, a little off their surfaces.
 
     Branches of one ray share their first segments: each distinct one is kept once.
     """
     passes = []
+    name = paths.ray.astype(np.int64)
     for k in range(int(paths.bounces.max()) + 1):
         alive = np.flatnonzero(paths.bounces >= k)
-        alive = alive[(paths.bounces[alive] > k) | (paths.fate[alive] <= ft.Fate.TRUNCATED)]
-        history = np.column_stack([paths.ray[alive], paths.triangle[alive, :k], paths.surface[alive, :k]])
         start, end = paths.points[alive, k], paths.points[alive, k + 1]
-        on = np.isfinite(end[:, 0])
-        along = np.where(on[:, None], np.where(on[:, None], end, 0.0) - start, paths.direction[alive])
+        on = np.isfinite(end[:, :1])
+        along = np.where(on, np.where(on, end, 0.0) - start, paths.direction[alive])
         along /= np.linalg.norm(along, axis=1, keepdims=True)
-        history = np.column_stack([history, np.round(along * 2**20)]).astype(np.int64)
-        _, first = np.unique(history, axis=0, return_index=True)
+        # a ray's branches differ in what they met before and in where they go
+        if k:
+            name = name * 1000003 + paths.triangle[:, k - 1]
+        heading = np.round(along * 2**20).astype(np.int64) @ np.array([1, 1 << 21, 1 << 42])
+        _, first = np.unique(name[alive] * 1000003 + heading, return_index=True)
         first.sort()
         start, along = start[first], along[first]
-        passes.append((((start - centre) * scale + 2e-6 * along).astype(np.float32), along.astype(np.float32)))
+        begin = (start - centre) * scale + 2e-6 * along
+        passes.append((begin.astype(np.float32), along.astype(np.float32)))
     return passes

@@ -20,45 +20,53 @@ RIM = 1e-12
 TIE = 1e-12
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+jit = njit(cache=True, nogil=True, error_model="numpy")
+
+
+@jit
+def _crossing(ox, oy, oz, dx, dy, dz, corner, rim):
+    """Path at which a line crosses a triangle, or infinity (Moeller and Trumbore, 1997)."""
+    ax, ay, az = corner[0, 0], corner[0, 1], corner[0, 2]
+    ux, uy, uz = corner[1, 0] - ax, corner[1, 1] - ay, corner[1, 2] - az
+    vx, vy, vz = corner[2, 0] - ax, corner[2, 1] - ay, corner[2, 2] - az
+    px, py, pz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
+    det = ux * px + uy * py + uz * pz
+    sx, sy, sz = ox - ax, oy - ay, oz - az
+    a = (sx * px + sy * py + sz * pz) / det
+    qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
+    b = (dx * qx + dy * qy + dz * qz) / det
+    if a >= -rim and b >= -rim and a + b <= 1.0 + rim:
+        return (vx * qx + vy * qy + vz * qz) / det
+    return np.inf
+
+
+@jit
+def _enter(ox, oy, oz, dx, dy, dz, lower, upper, entry):
+    """Path at which a line enters each box, infinity where it passes by."""
+    fx, fy, fz = 1.0 / dx, 1.0 / dy, 1.0 / dz
+    for g in range(len(entry)):
+        x, u = (lower[0, g] - ox) * fx, (upper[0, g] - ox) * fx
+        y, v = (lower[1, g] - oy) * fy, (upper[1, g] - oy) * fy
+        z, w = (lower[2, g] - oz) * fz, (upper[2, g] - oz) * fz
+        begin = max(max(min(x, u), min(y, v)), min(z, w))
+        end = min(min(max(x, u), max(y, v)), max(z, w))
+        entry[g] = np.inf if begin > end or end < 0.0 else begin
+
+
+@jit
 def _first_hits(origin, direction, left, corners, lower, upper, group, slack, rim, path, triangle):
-    maybe, entry = np.empty(lower.shape[1], np.bool_), np.empty(lower.shape[1])
+    entry = np.empty(lower.shape[1])
     for i in range(len(origin)):
         ox, oy, oz = origin[i]
         dx, dy, dz = direction[i]
-        fx, fy, fz = 1.0 / dx, 1.0 / dy, 1.0 / dz
         best, which = np.inf, -1
-        for g in range(len(maybe)):
-            x, u = (lower[0, g] - ox) * fx, (upper[0, g] - ox) * fx
-            y, v = (lower[1, g] - oy) * fy, (upper[1, g] - oy) * fy
-            z, w = (lower[2, g] - oz) * fz, (upper[2, g] - oz) * fz
-            begin = max(max(min(x, u), min(y, v)), min(z, w))
-            end = min(min(max(x, u), max(y, v)), max(z, w))
-            maybe[g] = not (begin > end or end < 0.0)
-            entry[g] = begin
-        for g in range(len(maybe)):
-            if not maybe[g] or entry[g] > best:
+        _enter(ox, oy, oz, dx, dy, dz, lower, upper, entry)
+        for g in range(len(entry)):
+            if entry[g] == np.inf or entry[g] > best:
                 continue
             for k in range(group[g], group[g + 1]):
-                if k == left[i]:
-                    continue
-                ax, ay, az = corners[k, 0, 0], corners[k, 0, 1], corners[k, 0, 2]
-                ux, uy, uz = corners[k, 1, 0] - ax, corners[k, 1, 1] - ay, corners[k, 1, 2] - az
-                vx, vy, vz = corners[k, 2, 0] - ax, corners[k, 2, 1] - ay, corners[k, 2, 2] - az
-                px, py, pz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
-                det = ux * px + uy * py + uz * pz
-                if det == 0.0:
-                    continue
-                sx, sy, sz = ox - ax, oy - ay, oz - az
-                a = (sx * px + sy * py + sz * pz) / det
-                if a < -rim or a > 1.0 + rim:
-                    continue
-                qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
-                b = (dx * qx + dy * qy + dz * qz) / det
-                if b < -rim or a + b > 1.0 + rim:
-                    continue
-                t = (vx * qx + vy * qy + vz * qz) / det
-                if slack < t < best:
+                t = _crossing(ox, oy, oz, dx, dy, dz, corners[k], rim)
+                if slack < t < best and k != left[i]:
                     best, which = t, k
         path[i], triangle[i] = best, which
 
@@ -113,7 +121,8 @@ class Verdict:
     """What the twin says of recorded paths: counts, and the largest errors relative to the path.
 
     `distance` is off along the ray, `aside` is how far from the reflected ray a hit lies. `wrong` are
-    hits at another place than the twin's: (path, bounce, triangle, the twin's triangle).
+    hits at another place than the twin's: (path, bounce, triangle, the twin's triangle); `graze` is how far
+    from an edge of the nearer triangle the ray passes there, relative to the scene.
     """
 
     bounces: int = 0
@@ -121,13 +130,13 @@ class Verdict:
     ties: int = 0
     distance: float = 0.0
     aside: float = 0.0
+    graze: float = 0.0
     wrong: tuple[tuple[int, int, int, int], ...] = ()
 
     def __add__(self, other):
-        return Verdict(
-            self.bounces + other.bounces, self.itself + other.itself, self.ties + other.ties,
-            max(self.distance, other.distance), max(self.aside, other.aside), self.wrong + other.wrong,
-        )  # fmt: skip
+        counts = [getattr(self, name) + getattr(other, name) for name in ("bounces", "itself", "ties")]
+        worst = [max(getattr(self, name), getattr(other, name)) for name in ("distance", "aside", "graze")]
+        return Verdict(*counts, *worst, self.wrong + other.wrong)
 
 
 def corners_of(scene):
@@ -144,7 +153,20 @@ def corners_of(scene):
     return np.take_along_axis(corners, turn[:, :, None], axis=1), first
 
 
-def judge(paths, slack=1e-13):
+def _from_the_rim(corners, point):
+    """Distance of points (n, 3) from the nearest side of their triangles (n, 3, 3)."""
+    side = np.roll(corners, -1, axis=1) - corners
+    reach = point[:, None] - corners
+    along = np.clip((reach * side).sum(axis=2) / (side * side).sum(axis=2), 0.0, 1.0)
+    return np.linalg.norm(reach - along[:, :, None] * side, axis=2).min(axis=1)
+
+
+def _reflect(direction, rows, normal):
+    d = direction[rows]
+    direction[rows] = d - 2.0 * np.einsum("ij,ij->i", d, normal)[:, None] * normal
+
+
+def judge(paths, begin=0, slack=1e-13):
     """Find every segment of recorded paths again, each from its recorded start.
 
     Directions are reflected here, one bounce after the other, off the recorded triangles; those of
@@ -155,6 +177,8 @@ def judge(paths, slack=1e-13):
     ----------
     paths : Paths
         Of mirrors, recorded.
+    begin : int
+        Leave out the segments before this one, from the path that errors are relative to as well.
     slack : float
         Part of the scene's size below which a crossing is the start itself.
 
@@ -179,7 +203,13 @@ def judge(paths, slack=1e-13):
         step = np.where(met[:, None], paths.points[rows, k + 1] - start, 0.0)
         length = np.linalg.norm(step, axis=1)
         way[rows] += length
-        aside = np.linalg.norm(step - np.einsum("ij,ij->i", step, d)[:, None] * d, axis=1)[met] / way[rows[met]]
+        if k < begin:
+            way[:] = 0.0
+            _reflect(direction, rows[met], normal[mine[met]])
+            continue
+        aside = (
+            np.linalg.norm(step - np.einsum("ij,ij->i", step, d)[:, None] * d, axis=1)[met] / way[rows[met]]
+        )
         long = length > 1e-6 * size
         seen = d.copy()
         seen[long] = step[long] / length[long, None]
@@ -189,14 +219,17 @@ def judge(paths, slack=1e-13):
         off[both] = np.abs(path - length)[both] / way[rows[both]]
         off[~met & (twins < 0)] = 0.0
         wrong = (off > TIE) & (mine != twins)
+        nearer = np.where(met & (length < path), mine, twins)[wrong]
+        reach = np.where(met, np.minimum(length, path), path)[wrong]
+        graze = _from_the_rim(corners[nearer], start[wrong] + reach[:, None] * seen[wrong]) / size
         verdict += Verdict(
             bounces=int(met.sum()),
             itself=int(((mine == left) & met).sum()),
             ties=int((~wrong & (mine != twins)).sum()),
             distance=float(off[~wrong].max(initial=0.0)),
             aside=float(aside.max(initial=0.0)),
+            graze=float(graze.max(initial=0.0)),
             wrong=tuple((int(rows[j]), k, int(mine[j]), int(twins[j])) for j in np.flatnonzero(wrong)),
         )
-        n, d = normal[mine[met]], d[met]
-        direction[rows[met]] = d - 2.0 * np.einsum("ij,ij->i", d, n)[:, None] * n
+        _reflect(direction, rows[met], normal[mine[met]])
     return verdict

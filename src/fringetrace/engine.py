@@ -24,6 +24,9 @@ EPSILON = float(np.finfo(np.float64).eps)
 SPREAD = 64.0
 # Surfaces share a body only with this part of their size between them: far more than float32 blurs.
 CLEAR = 1e-3
+# A surface is a plane if no vertex stands off it by more than this part of the unit box; around a
+# surface there is this much room, beyond all that float32 and restarts move a ray.
+FLAT, ROOM = 1e-15, 1e-4
 # How many faces lend their planes to the test for that, and from how many vertices on a box stands in.
 FACES, MANY = 16, 10000
 
@@ -51,11 +54,15 @@ class Body:
     vertices: FloatArray  # (v, 3), unit box
     faces: IntArray
     planes: FloatArray  # (t, 16)
-    gentle: npt.NDArray[np.bool_]  # (t,), all three edges are shared, with folds of 26 degrees or less
+    gentle: npt.NDArray[
+        np.uint8
+    ]  # (t,), a bit for each edge that is shared, with a fold of 26 degrees or less
     frame: FloatArray  # (7,)
     oriented: bool
     closed: bool
     surfaces: tuple[int, ...]
+    flat: npt.NDArray[np.bool_]  # (s,), a surface that is one plane
+    boxes: tuple[FloatArray, FloatArray]  # (s, 3) each, lower and upper, a little larger than the surfaces
 
     @property
     def stop(self) -> int:
@@ -100,6 +107,16 @@ class Engine:
     owner: npt.NDArray[np.int32]
     offset: IntArray
 
+    @property
+    def base(self) -> int:
+        """Base of a path key, whose digits name surface and branch."""
+        return 2 * len(self.offset) + 1
+
+    @cached_property
+    def digit(self) -> Array:
+        """(t,) What a reflection off each triangle adds to a path key; small, to stay in the cache."""
+        return (2 * self.owner + 1).astype(np.min_scalar_type(self.base))
+
 
 @dataclass(frozen=True, eq=False)
 class Hits:
@@ -133,7 +150,7 @@ class Hits:
 class Limits:
     """Where paths end: on a screen (as `kernels` read it), after so many bounces; the first ray's number."""
 
-    screen: FloatArray
+    screen: tuple[float, ...]
     has_screen: bool
     max_bounces: int
     first: int
@@ -168,7 +185,7 @@ def _planes(corners: FloatArray) -> FloatArray:
     sides = np.roll(corners, -1, axis=1) - corners
     normal = np.cross(sides[:, 0], sides[:, 1])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    planes = np.empty((len(corners), 16))
+    planes = _aligned(len(corners))
     planes[:, :3] = normal
     planes[:, 3] = -np.einsum("ij,ikj->i", normal, corners) / 3.0
     for k in range(3):
@@ -177,6 +194,13 @@ def _planes(corners: FloatArray) -> FloatArray:
         planes[:, 4 * k + 4 : 4 * k + 7] = inward
         planes[:, 4 * k + 7] = -np.einsum("ij,ij->i", inward, corners[:, k])
     return planes
+
+
+def _aligned(rows: int) -> FloatArray:
+    """Room for 16 numbers a row, each row in two cache lines."""
+    raw = np.empty(16 * rows + 8)
+    begin = (-raw.ctypes.data // 8) % 8
+    return raw[begin : begin + 16 * rows].reshape(rows, 16)
 
 
 def _topology(faces: IntArray, normal: FloatArray) -> tuple[bool, bool, FloatArray]:
@@ -233,8 +257,25 @@ def _body(surfaces: tuple[Surface, ...], members: tuple[int, ...], first: int) -
     frame[4] = np.sqrt((local**2).sum(axis=1).max()) * (1.0 + 1e-6) + 1e-5
     frame[5] = _restart(sharpest)
     frame[6] = 32.0 * EPSILON * (1.0 + np.abs(centre).max() * scale)
-    gentle = np.asarray((cosine > GENTLE).all(axis=1) & oriented)
-    return Body(first, local, faces, planes, gentle, frame, oriented, closed, members)
+    gentle = np.packbits((cosine > GENTLE) & oriented, axis=1, bitorder="little")[:, 0]
+    shells = _shells(meshes, planes, corners)
+    return Body(first, local, faces, planes, gentle, frame, oriented, closed, members, *shells)
+
+
+def _shells(
+    meshes: list[Mesh], planes: FloatArray, corners: FloatArray
+) -> tuple[npt.NDArray[np.bool_], tuple[FloatArray, FloatArray]]:
+    """Which surfaces of a body are planes, and the box of each, in the unit box."""
+    flat, lower, upper = [], [], []
+    begin = 0
+    for mesh in meshes:
+        own = slice(begin, begin + len(mesh.faces))
+        begin = own.stop
+        height = corners[own] @ planes[own.start, :3] + planes[own.start, 3]
+        flat.append(bool(np.abs(height).max() < FLAT))
+        lower.append(corners[own].min(axis=(0, 1)) - ROOM)
+        upper.append(corners[own].max(axis=(0, 1)) + ROOM)
+    return np.array(flat), (np.array(lower), np.array(upper))
 
 
 def _apart(one: Mesh, other: Mesh) -> bool:
@@ -317,10 +358,25 @@ def aim(engine: Engine, batch: Batch, rows: int, hits: Hits, number: int, fresh:
 
     body = engine.bodies[number]
     count: int = kernels.aim(
-        rows, batch.state, batch.last, body.frame, body.first, body.stop, hits.met, hits.triangle,
+        rows, batch.state, batch.last, body.frame, body.first, body.stop, engine.owner,
+        np.array(body.surfaces), body.flat, *body.boxes, hits.met, hits.triangle,
         fresh, hits.origin32, hits.direction32, hits.sent,
     )  # fmt: skip
     return count
+
+
+def _second(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.int32], hits: Hits) -> None:
+    """A second opinion, a little aside, on suspicious answers; -2 where the two differ."""
+    from fringetrace import kernels
+
+    found = kernels.suspect(
+        hits.sent, count, prim, batch.state, batch.last, body.first, body.stop, body.closed,
+        body.frame[4], body.planes, hits.origin32, hits.direction32, hits.asked,
+    )  # fmt: skip
+    if found:
+        rows = hits.asked[:found]
+        again = body.embree.run(hits.origin32[:found], hits.direction32[:found])
+        prim[rows[again != prim[rows]]] = -2
 
 
 def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:
@@ -355,16 +411,10 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
         if count == 0:
             continue
         prim = body.embree.run(origin32[:count], direction32[:count])
-        found = kernels.suspect(
-            hits.sent, count, prim, batch.state, batch.last, body.first, body.stop, body.closed,
-            body.frame[4], body.planes, origin32, direction32, hits.asked,
-        )  # fmt: skip
-        if found:
-            second = body.embree.run(origin32[:found], direction32[:found])
-            rows_asked = hits.asked[:found]
-            prim[rows_asked[second != prim[rows_asked]]] = -2
+        _second(body, batch, count, prim, hits)
         doubtful += kernels.measure(
-            hits.sent, count, prim, batch.state, batch.last, batch.straight, *body.packed, hits.met, hits.triangle
+            hits.sent, count, prim, batch.state, batch.last, batch.straight, *body.packed, hits.met,
+            hits.triangle,
         )  # fmt: skip
     if fresh:
         hits.met[:rows, 0] = np.inf
@@ -373,7 +423,7 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
 
 
 def follow(
-    engine: Engine, batch: Batch, rows: int, hits: Hits, ends: Ends, limits: Limits
+    engine: Engine, batch: Batch, rows: int, bounces: int, hits: Hits, ends: Ends, limits: Limits
 ) -> tuple[int, int, int]:
     """One more bounce of rays that have all just left the only body, all of ideal mirrors.
 
@@ -386,6 +436,8 @@ def follow(
     batch : Batch
     rows : int
         How many rays it holds.
+    bounces : int
+        How often each has been reflected.
     hits : Hits
         Its float32 rays are those of the batch; they are brought up to date.
     ends : Ends
@@ -400,14 +452,12 @@ def follow(
 
     body = engine.bodies[0]
     prim = body.embree.run(hits.origin32[:rows], hits.direction32[:rows])
-    if not body.closed and (prim < 0).any():
-        missed = np.flatnonzero(prim < 0)
-        aside = hits.origin32[missed] + kernels.ASIDE * np.array([0.61, -0.47, 0.64], dtype=np.float32)
-        prim[missed[body.embree.run(aside, hits.direction32[missed]) >= 0]] = -2
+    if not body.closed and prim.min() < 0:
+        _second(body, batch, rows, prim, hits)
     result: tuple[int, int, int] = kernels.rebound(
-        rows, prim, batch.state, batch.key, batch.ray, batch.last,
-        batch.bounces, batch.straight, *body.packed[2:], engine.owner, len(engine.offset),
-        limits.screen, limits.has_screen, limits.max_bounces, ends.origin, ends.direction, ends.length, ends.key,
-        ends.ray, ends.bounces, ends.fate, 0, limits.first, hits.origin32, hits.direction32,
+        rows, bounces, prim, batch.state, batch.key, batch.ray, batch.last, batch.straight,
+        *body.packed[2:], engine.digit, np.uint64(engine.base),
+        limits.screen, limits.has_screen, limits.max_bounces, ends.origin, ends.direction, ends.length,
+        ends.key, ends.ray, ends.bounces, ends.fate, 0, limits.first, hits.origin32, hits.direction32,
     )  # fmt: skip
     return result

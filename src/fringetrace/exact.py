@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+# No fast mathematics, here or in a caller (numba hands it on): a fused multiplication and addition
+# would round the two sides of an edge differently, and rays would slip through.
 jit: Any = njit(nogil=True, cache=True, error_model="numpy")
 part: Any = njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 

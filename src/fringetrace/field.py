@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fringetrace.paths import Fate, Paths, pixels
+from fringetrace.paths import Paths, screen
 from fringetrace.waves import ComplexArray, checked_wavelength
 
 
@@ -52,13 +52,11 @@ def complex_field(
             raise ValueError("complex_field: expected paths traced onto a CCD, got paths without one")
         if total is None:
             total = np.zeros(part.ccd.shape, dtype=np.complex128)
-        seen = np.flatnonzero(part.fate == Fate.DETECTED)
         weight = 1.0 if part.area is None else part.area / part.ccd.pitch**2
-        amplitude = part.amplitude[seen] * weight
-        if not half_wave_loss:
-            amplitude *= 1.0 - 2.0 * (part.reflections[seen] % 2)
-        pixel = pixels(part.ccd, part.origin[seen])
-        kernels.gather(pixel, part.length[seen], amplitude, period, total)
+        kernels.gather(
+            part.fate, part.origin, part.length, part.amplitude, part.reflections, half_wave_loss,
+            screen(part.ccd), part.ccd.pitch, weight, period, total,
+        )  # fmt: skip
     if total is None:
         raise ValueError("complex_field: expected at least one Paths, got none")
     return total

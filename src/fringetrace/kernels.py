@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.exact import decide, inset, jit, part
+from fringetrace.exact import decide, enters, inset, inverse, jit, part
 
 # float32 resolves 2**-24 of the unit box; eight such steps separate a restart from its surface.
 SHIFT = 2.0**-20
@@ -71,13 +71,30 @@ def launch(first, rows, columns, centre, u, v, direction, width, height, start, 
 
 
 @jit
+def begin(
+    start, along, length, first, state, lost, amplitude, key, ray, last, bounces, reflections, straight, serial
+):  # fmt: skip
+    """Fill a batch with rays that have met nothing yet; the amplitude is that of the path alone."""
+    for i in range(len(start)):
+        state[i, OX], state[i, OY], state[i, OZ] = start[i, 0], start[i, 1], start[i, 2]
+        state[i, DX], state[i, DY], state[i, DZ] = along[i, 0], along[i, 1], along[i, 2]
+        state[i, NX], state[i, NY], state[i, NZ] = 0.0, 0.0, 0.0
+        state[i, WAY], state[i, EDGE] = length[i], 0.0
+        lost[i], amplitude[i], key[i] = 0.0, 1.0, 0
+        ray[i], last[i], serial[i] = first + i, -1, i
+        bounces[i], reflections[i], straight[i] = 0, 0, False
+
+
+@jit
 def aim(
-    total, state, last, frame, first, stop, met, triangle, fresh, origin32, direction32, sent
+    total, state, last, frame, first, stop, owner, members, flat, lower, upper, met, triangle, fresh,
+    origin32, direction32, sent,
 ):  # fmt: skip
     """Collect, in float32 and the unit box of a body, the rays that can meet it; return how many.
 
-    A ray that just left this body restarts `SHIFT` above its last triangle; one from outside
-    starts at the bounding sphere. `fresh`: forget what each ray met before.
+    `members` are the body's surfaces, in boxes `lower` to `upper`; from a `flat` one a ray does not
+    come back to it. A ray that just left this body restarts `SHIFT` above its last triangle; one
+    from outside starts at the bounding sphere. `fresh`: forget what each ray met before.
     """
     cx, cy, cz, scale, radius = frame[0], frame[1], frame[2], frame[3], frame[4]
     count = 0
@@ -88,9 +105,20 @@ def aim(
         x = (state[row, OX] - cx) * scale
         y = (state[row, OY] - cy) * scale
         z = (state[row, OZ] - cz) * scale
-        if first <= last[row] < stop:
-            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
-            x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz)
+        own = first <= last[row] < stop
+        if len(members) > 1 or (own and flat[0]):
+            ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
+            left = owner[last[row]] if own else -1
+            hopeful = False
+            for s in range(len(members)):
+                if members[s] == left:
+                    hopeful |= not flat[s]
+                else:
+                    hopeful |= enters(lower, upper, s, x, y, z, ix, iy, iz, np.inf) < np.inf
+            if not hopeful:
+                continue
+        if own:
+            x, y, z = restart(x, y, z, dx, dy, dz, state[row, NX], state[row, NY], state[row, NZ])
         else:
             along = x * dx + y * dy + z * dz
             qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
@@ -135,15 +163,31 @@ def suspect(
                 continue
         elif tri >= 0:
             continue
-        origin32[found, 0] = origin32[i, 0] + 0.61 * ASIDE
-        origin32[found, 1] = origin32[i, 1] - 0.47 * ASIDE
-        origin32[found, 2] = origin32[i, 2] + 0.64 * ASIDE
+        ax, ay, az = 0.61 * ASIDE, -0.47 * ASIDE, 0.64 * ASIDE
+        if first <= last[row] < stop:  # not through the face just left
+            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+            up = ax * nx + ay * ny + az * nz
+            ax, ay, az = ax - up * nx, ay - up * ny, az - up * nz
+        origin32[found, 0] = origin32[i, 0] + ax
+        origin32[found, 1] = origin32[i, 1] + ay
+        origin32[found, 2] = origin32[i, 2] + az
         direction32[found, 0] = direction32[i, 0]
         direction32[found, 1] = direction32[i, 1]
         direction32[found, 2] = direction32[i, 2]
         asked[found] = i
         found += 1
     return found
+
+
+@jit
+def softly(planes, tri, x, y, z, folds, margin):
+    """Whether all edges of a triangle that a point is nearer to than `margin` have gentle folds (bits)."""
+    for k in range(3):
+        e = 4 * k + 4
+        height = planes[tri, e] * x + planes[tri, e + 1] * y + planes[tri, e + 2] * z + planes[tri, e + 3]
+        if height < margin and not (folds >> k) & 1:
+            return False
+    return True
 
 
 @jit
@@ -223,11 +267,14 @@ def measure(
             inside = inset(planes, k, px, py, pz)
             doubt = not (distance > MARGIN and distance < 1e300)
             if inside <= MARGIN:
-                doubt |= not (inside > sure and abs(facing) > STEEP and gentle[k])
+                steep = inside > sure and abs(facing) > STEEP
+                doubt |= not (steep and softly(planes, guess, px, py, pz, gentle[k], MARGIN))
             doubt |= own and (guess == left - first or (closed and facing * leaving >= 0.0))
         else:
             doubt = guess == -2 or (own and closed and leaving < 0.0)
-        near = own and state[row, EDGE] < frame[5] and not (abs(leaving) > STEEP and gentle[left - first])
+        near = own and state[row, EDGE] < frame[5]
+        if near and abs(leaving) > STEEP:
+            near = not softly(planes, left - first, x, y, z, gentle[left - first], frame[5])
         if doubt or near:
             # near an edge the step off the surface may have jumped something; beyond it Embree is
             # right, if the step went along the ray
@@ -273,17 +320,19 @@ def lands(screen, path, x, y, z, dx, dy, dz):
 
 @jit
 def rebound(
-    count, prim, state, key, ray, last, bounces, straight, oriented, closed,
-    frame, planes, gentle, corners, order, lower, upper, owner, surfaces, screen, has_screen, max_bounces,
-    end_origin, end_direction, end_length, end_key, end_ray, end_bounces, end_fate, ended, first, origin32, direction32,
+    count, steps, prim, state, key, ray, last, straight, oriented, closed,
+    frame, planes, gentle, corners, order, lower, upper, digit, base, screen, has_screen, max_bounces,
+    end_origin, end_direction, end_length, end_key, end_ray, end_bounces, end_fate, ended, first, origin32,
+    direction32,
 ):  # fmt: skip
-    """`measure`, `interact` and `aim` in one for a single body of ideal mirrors that all rays just left.
+    """`measure`, `interact` and `aim` in one, for a single body of ideal mirrors that all rays just left.
+
+    Each has made `steps` bounces. `digit` is what a triangle adds to a key of that `base`.
 
     Returns how many rays go on, how many have ended, and how many hits were doubtful.
     """
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
     unscale, sure = 1.0 / scale, 4.0 * frame[6]
-    base = np.uint64(2 * surfaces + 1)
     kept, doubtful = 0, 0
     for row in range(count):
         guess = np.int64(prim[row])
@@ -301,11 +350,15 @@ def rebound(
             inside = inset(planes, k, px, py, pz)
             doubt = not (distance > MARGIN and distance < 1e300)
             if inside <= MARGIN:
-                doubt |= not (inside > sure and abs(facing) > STEEP and gentle[k])
+                steep = inside > sure and abs(facing) > STEEP
+                doubt |= not (steep and softly(planes, guess, px, py, pz, gentle[k], MARGIN))
             doubt |= guess == last[row] or (closed and facing * leaving >= 0.0)
         else:
             doubt = guess == -2 or (closed and leaving < 0.0)
-        if doubt or (state[row, EDGE] < frame[5] and not (abs(leaving) > STEEP and gentle[last[row]])):
+        near = state[row, EDGE] < frame[5]
+        if near and abs(leaving) > STEEP:
+            near = not softly(planes, last[row], x, y, z, gentle[last[row]], frame[5])
+        if doubt or near:
             doubtful += 1
             local = not doubt and abs(leaving) > GRAZING  # see `measure`
             exact, tri, ex, ey, ez, rest = doubted(
@@ -324,7 +377,7 @@ def rebound(
             fate = DETECTED
         elif guess < 0:
             fate, reach = LEFT, 0.0
-        elif bounces[row] >= max_bounces:
+        elif steps >= max_bounces:
             fate, reach = TRUNCATED, 0.0
         if fate != ALIVE:
             end = ray[row] - first
@@ -333,7 +386,7 @@ def rebound(
             end_origin[end, 2] = gz + reach * dz
             end_direction[end, 0], end_direction[end, 1], end_direction[end, 2] = dx, dy, dz
             end_length[end], end_key[end], end_ray[end] = state[row, WAY] + reach, key[row], ray[row]
-            end_bounces[end], end_fate[end] = bounces[row], fate
+            end_bounces[end], end_fate[end] = steps, fate
             ended += 1
             continue
         k = np.uintp(guess)
@@ -341,12 +394,13 @@ def rebound(
         height = nx * px + ny * py + nz * pz + planes[k, 3]
         x, y, z = px - height * nx, py - height * ny, pz - height * nz
         dx, dy, dz = bounced(dx, dy, dz, nx, ny, nz)
-        state[kept, OX], state[kept, OY], state[kept, OZ] = cx + x * unscale, cy + y * unscale, cz + z * unscale
+        gx, gy, gz = cx + x * unscale, cy + y * unscale, cz + z * unscale
+        state[kept, OX], state[kept, OY], state[kept, OZ] = gx, gy, gz
         state[kept, DX], state[kept, DY], state[kept, DZ] = dx, dy, dz
         state[kept, NX], state[kept, NY], state[kept, NZ] = nx, ny, nz
         state[kept, WAY], state[kept, EDGE], last[kept] = state[row, WAY] + path, inside, guess
-        key[kept] = key[row] * base + np.uint64(2 * owner[k] + 1)
-        ray[kept], bounces[kept] = ray[row], bounces[row] + 1
+        key[kept] = key[row] * base + np.uint64(digit[k])
+        ray[kept] = ray[row]
         x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz)
         origin32[kept, 0], origin32[kept, 1], origin32[kept, 2] = x, y, z
         direction32[kept, 0], direction32[kept, 1], direction32[kept, 2] = dx, dy, dz
@@ -356,8 +410,8 @@ def rebound(
 
 @jit
 def interact(
-    count, state, lost, amplitude, key, ray, last, bounces, reflections, straight, serial, met, triangle, owner,
-    reflection, transmission, plain, screen,
+    count, state, lost, amplitude, key, ray, last, bounces, reflections, straight, serial, met, triangle,
+    owner, reflection, transmission, plain, screen,
     has_screen, max_bounces, faint, end_origin, end_direction, end_length, end_lost, end_amplitude, end_key,
     end_ray, end_bounces, end_reflections, end_fate, end_serial, ended, first, serials,
 ):  # fmt: skip
@@ -470,16 +524,54 @@ def interact(
     return kept + born, born, ended, serials
 
 
-@jit
-def gather(pixel, length, amplitude, period, total):
-    """Add amplitude * exp(2 pi i length / period) to the pixels, in the order of the rays.
+@part
+def place(screen, pitch, rows, columns, x, y, z):
+    """CCD coordinates (row, column) in pixels of a point in its plane of focus."""
+    x, y, z = x - screen[0], y - screen[1], z - screen[2]
+    v = (x * screen[9] + y * screen[10] + z * screen[11]) / pitch + 0.5 * rows
+    u = (x * screen[6] + y * screen[7] + z * screen[8]) / pitch + 0.5 * columns
+    return v, u
 
-    The remainder is exact, so long paths cost no digits.
+
+@jit
+def locate(screen, pitch, rows, columns, point, pixel):
+    """`place` for points (n, 3)."""
+    for i in range(len(point)):
+        pixel[i, 0], pixel[i, 1] = place(screen, pitch, rows, columns, point[i, 0], point[i, 1], point[i, 2])
+
+
+@jit
+def gather(fate, point, length, amplitude, reflections, loss, screen, pitch, weight, period, total):
+    """Add weight * amplitude * exp(2 pi i length / period) of detected rays to their pixels, in order.
+
+    The remainder is exact, so long paths cost no digits. Without `loss` the -1 of each reflection
+    is left out.
     """
     rows, columns = total.shape
-    for i in range(len(length)):
-        v, u = int(pixel[i, 0]), int(pixel[i, 1])
+    for i in range(len(fate)):
+        if fate[i] != DETECTED:
+            continue
+        v, u = place(screen, pitch, rows, columns, point[i, 0], point[i, 1], point[i, 2])
         turn = 2.0 * np.pi * ((length[i] % period) / period)
-        phasor = complex(np.cos(turn), np.sin(turn))
+        phasor = complex(np.cos(turn), np.sin(turn)) * weight
+        if not loss and reflections[i] % 2 == 1:
+            phasor = -phasor
         # a point on the rim may round to the pixel beyond it
-        total[min(max(v, 0), rows - 1), min(max(u, 0), columns - 1)] += amplitude[i] * phasor
+        row, column = min(max(int(np.floor(v)), 0), rows - 1), min(max(int(np.floor(u)), 0), columns - 1)
+        total[row, column] += amplitude[i] * phasor
+
+
+@jit
+def sort(ray, first, count):
+    """Order that sorts ends by their ray, those of one ray as they come (a counting sort)."""
+    place = np.zeros(count + 1, np.int64)
+    for i in range(len(ray)):
+        place[ray[i] - first + 1] += 1
+    for k in range(count):
+        place[k + 1] += place[k]
+    order = np.empty(len(ray), np.int64)
+    for i in range(len(ray)):
+        k = ray[i] - first
+        order[place[k]] = i
+        place[k] += 1
+    return order

@@ -266,10 +266,28 @@ def pixels(ccd: CCD, point: FloatArray) -> FloatArray:
     (n, 2) float64
         (row, column) in pixels; pixel [i, j] spans [i, i+1) x [j, j+1).
     """
-    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
-    offset = point - ccd.centre
-    rows, columns = ccd.shape
-    return np.stack([offset @ v / ccd.pitch + 0.5 * rows, offset @ u / ccd.pitch + 0.5 * columns], axis=1)
+    from fringetrace import kernels
+
+    pixel = np.empty((len(point), 2))
+    kernels.locate(screen(ccd), ccd.pitch, *ccd.shape, np.ascontiguousarray(point), pixel)
+    return pixel
+
+
+def screen(ccd: CCD) -> tuple[float, ...]:
+    """A CCD as the kernels read it: centre, normal, u, v, half width, half height, focus.
+
+    Parameters
+    ----------
+    ccd : CCD
+
+    Returns
+    -------
+    15 floats, metres
+    """
+    u, v, n = frame(ccd.normal, ccd.up, "CCD")
+    width, height = ccd.size
+    numbers = [*ccd.centre, *n, *u, *v, 0.5 * width, 0.5 * height, ccd.focus]
+    return tuple(float(number) for number in numbers)
 
 
 def project(paths: Paths, ccd: CCD) -> Paths:

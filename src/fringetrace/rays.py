@@ -148,7 +148,7 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
     u, v, n = frame(beam.direction, beam.up, "Beam")
     origin, direction = np.empty((count, 3)), np.empty((count, 3))
     kernels.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
-    amplitude = np.ones(count, dtype=np.complex128)
+    amplitude = np.broadcast_to(np.complex128(1.0), (count,))  # read-only, and takes no room
     if beam.profile is not None:
         offset = origin - beam.centre
         values = np.asarray(beam.profile(offset @ u, offset @ v))
@@ -157,7 +157,7 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
                 f"Beam profile: expected a finite amplitude for each of {count} rays, "
                 f"got shape {values.shape} or others"
             )
-        amplitude[:] = values
+        amplitude = np.array(np.broadcast_to(values, (count,)), dtype=np.complex128)
     return _trusted(
         origin=origin,
         direction=direction,
@@ -245,16 +245,7 @@ def start(state: Batch, rays: Rays, first: int) -> None:
     first : int
         Number of the first of them.
     """
+    from fringetrace import kernels
+
     n = len(rays)
-    state.state[:n, :3] = rays.origin
-    state.state[:n, 3:6] = rays.direction
-    state.state[:n, 6:9] = 0.0
-    state.state[:n, 9] = rays.length
-    state.state[:n, 10:] = 0.0
-    state.amplitude[:n] = 1.0  # of the path alone: the launched amplitude is multiplied in at the end
-    state.ray[:n] = np.arange(first, first + n)
-    state.serial[:n] = np.arange(n)
-    state.last[:n] = -1
-    for column in (state.lost, state.key, state.bounces, state.reflections):
-        column[:n] = 0
-    state.straight[:n] = False
+    kernels.begin(rays.origin, rays.direction, rays.length, first, *vars(part(state, 0, n)).values())

@@ -14,10 +14,9 @@ from typing import TypeVar
 import numpy as np
 
 from fringetrace.engine import Engine, Hits, Limits, aim, build, find, follow
-from fringetrace.paths import Fate, Paths, join
+from fringetrace.paths import Fate, Paths, join, screen
 from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
 from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 Progress = Callable[[int, int], None]
@@ -41,7 +40,7 @@ class Plan:
     passed: frozenset[int]
     reflection: ComplexArray
     transmission: ComplexArray
-    screen: FloatArray
+    screen: tuple[float, ...]
     max_bounces: int
     faint: float
     record: bool
@@ -58,15 +57,6 @@ class Plan:
         """Some of the rays."""
         source = self.source
         return launch(source, first, stop) if isinstance(source, Beam) else source.part(first, stop)
-
-
-def _screen(ccd: CCD | None) -> FloatArray:
-    """A CCD as the kernels read it: centre, normal, u, v, half width, half height, focus."""
-    if ccd is None:
-        return np.zeros(15)
-    u, v, n = frame(ccd.normal, ccd.up, "CCD")
-    width, height = ccd.size
-    return np.concatenate([ccd.centre, n, u, v, [0.5 * width, 0.5 * height, ccd.focus]])
 
 
 def _whole(value: int, least: int, what: str) -> int:
@@ -99,7 +89,7 @@ def _plan(
         passed=passed,
         reflection=reflection,
         transmission=transmission,
-        screen=_screen(ccd),
+        screen=(0.0,) * 15 if ccd is None else screen(ccd),
         max_bounces=max_bounces,
         faint=float(min_amplitude) ** 2,
         record=record,
@@ -144,11 +134,12 @@ class Workspace:
 
     state: Batch
     hits: Hits
+    ends: Ends
 
     @staticmethod
     def blank(rows: int) -> Workspace:
         """Room for so many rays under way."""
-        return Workspace(blank(Batch, rows), Hits.blank(rows))
+        return Workspace(blank(Batch, rows), Hits.blank(rows), blank(Ends, rows))
 
 
 def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, old: int, hits: Hits) -> None:
@@ -166,8 +157,8 @@ def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, ol
     record.add(before["serial"][parents], serials, hits.triangle[rows], hits.met[rows, 1:4])
 
 
-def _advance(plan: Plan, space: Workspace, ends: Ends, first: int, stop: int) -> Chunk:
-    """Follow the rays from `first` up to `stop` to all their ends."""
+def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
+    """Follow the rays from `first` up to `stop` to all their ends: in `ends`, or in the workspace."""
     from fringetrace import kernels
 
     rays = plan.rays(first, stop)
@@ -175,21 +166,23 @@ def _advance(plan: Plan, space: Workspace, ends: Ends, first: int, stop: int) ->
         space.state, space.hits = blank(Batch, len(rays)), Hits.blank(len(rays))
     start(space.state, rays, first)
     record = _Record(rays.origin) if plan.record else None
-    ordered = not (plan.splits or plan.record)
-    count, ended, serials, segments, doubtful = len(rays), 0, len(rays), 0, 0
+    ordered = ends is not None
+    ends = space.ends if ends is None else ends
+    count, ended, serials, segments, doubtful, bounces = len(rays), 0, len(rays), 0, 0, 1
     passed = plan.passed
     limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
     simple = plan.plain and ordered and len(plan.engine.bodies) == 1
     while count:
         if simple and segments:
             segments += count
-            count, _, unsure = follow(plan.engine, space.state, count, space.hits, ends, limits)
+            count, _, unsure = follow(plan.engine, space.state, count, bounces, space.hits, ends, limits)
+            bounces += 1
             doubtful += unsure
             continue
         if plan.splits and 2 * count > len(space.state.ray):
             space.state, space.hits = grown(space.state, 4 * count), Hits.blank(4 * count)
         if not ordered and ended + 2 * count > len(ends.ray):
-            ends = grown(ends, 2 * (ended + 2 * count))
+            space.ends = ends = grown(ends, 2 * (ended + 2 * count))
         state, hits = space.state, space.hits
         segments += count
         doubtful += find(plan.engine, state, count, hits, passed)
@@ -226,12 +219,17 @@ def _recorded(plan: Plan, record: _Record, ends: Ends) -> dict[str, Array]:
 
 def _paths(
     plan: Plan, ends: Ends, first: int, launched: ComplexArray, segments: int, doubtful: int,
-    record: _Record | None = None,
+    record: _Record | None = None, whole: bool = False,
 ) -> Paths:  # fmt: skip
-    """The table of what has ended, sorted by ray; `launched` are the amplitudes from ray `first` on."""
-    if plan.splits or plan.record:
+    """The table of what has ended, sorted by ray; `launched` are the amplitudes from ray `first` on.
+
+    `whole`: each ray is in its row already, and the arrays may be kept.
+    """
+    if not whole:
+        from fringetrace import kernels
+
         # a ray's ends come in an order that does not depend on other rays: a stable sort keeps it
-        order = np.argsort(ends.ray, kind="stable")
+        order = kernels.sort(ends.ray, first, len(launched))
         ends = Ends(**{name: column[order] for name, column in vars(ends).items()})
     relative = launched[ends.ray - first] if len(ends.ray) > len(launched) else launched
     if plan.plain:
@@ -310,10 +308,10 @@ def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress |
 
     def work(first: int, stop: int) -> Paths:
         with spaces.one() as space:
-            done = _advance(plan, space, blank(Ends, stop - first), first, stop)
-        launched = np.asarray(done.rays.amplitude)
-        ends = part(done.ends, 0, done.rows)
-        return _paths(plan, ends, first, launched, done.segments, done.doubtful, done.record)
+            done = _advance(plan, space, None, first, stop)
+            launched = np.asarray(done.rays.amplitude)
+            ends = part(done.ends, 0, done.rows)
+            return _paths(plan, ends, first, launched, done.segments, done.doubtful, done.record)
 
     return _pooled(work, plan.total, threads, chunk, progress)
 
@@ -321,17 +319,22 @@ def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress |
 def _at_once(plan: Plan, threads: int | None, chunk: int, progress: Progress | None) -> Paths:
     """All rays in one table from the start: where no ray splits, each has its row."""
     spaces = _Workspaces(min(chunk, plan.total))
-    ends, launched = blank(Ends, plan.total), np.empty(plan.total, dtype=np.complex128)
+    ends = blank(Ends, plan.total)
+    uniform = isinstance(plan.source, Beam) and plan.source.profile is None
+    launched = np.broadcast_to(np.complex128(1.0), (plan.total,))
+    if not uniform:
+        launched = np.empty(plan.total, dtype=np.complex128)
 
     def work(first: int, stop: int) -> tuple[int, int]:
         with spaces.one() as space:
             done = _advance(plan, space, part(ends, first, stop), first, stop)
-        launched[first:stop] = done.rays.amplitude
+        if not uniform:
+            launched[first:stop] = done.rays.amplitude
         return done.segments, done.doubtful
 
     counts = list(_pooled(work, plan.total, threads, chunk, progress))
     segments, doubtful = (sum(count) for count in zip(*counts, strict=True))
-    return _paths(plan, ends, 0, launched, segments, doubtful)
+    return _paths(plan, ends, 0, launched, segments, doubtful, whole=True)
 
 
 def stream(

@@ -1,0 +1,203 @@
+"""Run time beside raw embreex: ratios of medians, measured in one run.
+
+    python benchmarks/tracing.py [--rays 1e6] [--json FILE]
+
+Raw embreex is `EmbreeScene.run` on the float32 rays that the trace recorded, pass by pass, on all
+triangles in one scene: no path, no point, no reflection, triangle numbers only. Ours gives, for the
+same rays, path, optical path in float64 and position. A ratio of 1 is the speed of raw embreex.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import scenes
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+
+import fringetrace as ft
+
+ROUNDS = 5
+
+
+def seconds(work) -> float:
+    """How long a call takes."""
+    begin = time.perf_counter()
+    work()
+    return time.perf_counter() - begin
+
+
+def raw(scene: ft.Scene, rays: scenes.Segments, centre_scale_mesh: tuple, chunk: int):
+    """A call that runs recorded rays through embreex alone."""
+    vertices, faces, _, _ = centre_scale_mesh
+    embree = EmbreeScene(robust=True)
+    TriangleMesh(embree, vertices, faces)
+    embree.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+
+    def run() -> None:
+        for origin, direction in rays:
+            for i in range(0, len(origin), chunk):
+                embree.run(origin[i : i + chunk], direction[i : i + chunk])
+
+    return run
+
+
+def compare(name: str, scene: ft.Scene, paths: ft.Paths, ours: dict) -> dict:
+    """Medians of raw embreex (in chunks and at once) and of our calls, taken in turn."""
+    mesh = scenes.joint(scene)
+    rays = scenes.segments(paths, mesh[2], mesh[3])
+    count = sum(len(origin) for origin, _ in rays)
+    calls = {
+        "raw, chunks": raw(scene, rays, mesh, 16384),
+        "raw, at once": raw(scene, rays, mesh, 1 << 40),
+        **ours,
+    }
+    for call in calls.values():
+        call()
+    times: dict = {label: [] for label in calls}
+    for _ in range(ROUNDS):
+        for label, call in calls.items():
+            times[label].append(seconds(call))
+    median = {label: statistics.median(values) for label, values in times.items()}
+    base = min(median["raw, chunks"], median["raw, at once"])
+    return {
+        "scene": name,
+        "segments": count,
+        "raw ns/segment": base / count * 1e9,
+        **{f"{label}: ratio to raw": base / median[label] for label in ours},
+        **{f"{label}: seconds": median[label] for label in ours},
+    }
+
+
+def bouncing(make, side: int) -> dict:
+    """12 bounces among mirrors, on one thread and on two."""
+    scene, beam = make()
+    beam = replace(beam, shape=(side, side))
+    paths = ft.trace(scene, beam, record=True)
+    assert paths.ledger().error < 1e-12
+    return compare(
+        make.__name__,
+        scene,
+        paths,
+        {
+            "1 thread": lambda: ft.trace(scene, beam, threads=1),
+            "2 threads": lambda: ft.trace(scene, beam, threads=2),
+        },
+    )
+
+
+def interferogram(side: int) -> dict:
+    """The Michelson, both arms, ray sum, one ray a pixel: trace and field."""
+    bench = scenes.michelson(side)
+    paths = ft.trace(bench.scene, bench.beam, bench.ccd, record=True)
+
+    def image(threads: int):
+        chunks = ft.stream(bench.scene, bench.beam, bench.ccd, threads=threads)
+        return np.abs(ft.complex_field(chunks, 633e-9)) ** 2
+
+    return compare(
+        "michelson", bench.scene, paths, {"1 thread": lambda: image(1), "2 threads": lambda: image(2)}
+    )
+
+
+def start_up() -> dict:
+    """Import beside what it rests on, and the demo the second time, each in a process of its own."""
+
+    def fresh(*command: str) -> float:
+        return seconds(lambda: subprocess.run(command, check=True, capture_output=True))
+
+    code = {"import numpy, embreex": [], "import fringetrace": []}
+    lines = {
+        "import numpy, embreex": "import numpy, embreex, embreex.rtcore_scene",
+        "import fringetrace": "import fringetrace",
+    }
+    for _ in range(2 * ROUNDS):
+        for label, line in lines.items():
+            code[label].append(fresh(sys.executable, "-c", line))
+    median = {label: statistics.median(values) for label, values in code.items()}
+    with tempfile.TemporaryDirectory() as folder:
+        demo = [
+            fresh(str(Path(sys.executable).with_name("fringetrace")), "demo", "--out", folder)
+            for _ in range(3)
+        ]
+    return {
+        **median,
+        "import ratio": median["import fringetrace"] / median["import numpy, embreex"],
+        "first demo, s": demo[0],
+        "second demo, s": min(demo[1:]),
+    }
+
+
+MEMORY = """
+import resource, sys
+import numpy as np
+import scenes
+import fringetrace as ft
+bench = scenes.michelson(int(sys.argv[1]))
+ccd = bench.ccd
+small = ft.Beam(bench.beam.centre, bench.beam.direction, bench.beam.up, bench.beam.size, (256, 256))
+ft.complex_field(ft.stream(bench.scene, small, ccd), 633e-9)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+field = ft.complex_field(ft.stream(bench.scene, bench.beam, ccd), 633e-9)
+after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(before / 1024, after / 1024, field.nbytes / 2**20)
+"""
+
+
+def memory(rays: float) -> dict:
+    """Peak memory of a process that streams rays through the Michelson into a field, MiB."""
+    side = int(np.ceil(np.sqrt(rays)))
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    done = subprocess.run(
+        [sys.executable, "-c", MEMORY, str(side)], check=True, capture_output=True, text=True, env=environment
+    )
+    before, after, field = (float(word) for word in done.stdout.split())
+    return {
+        "rays": side**2,
+        "peak, MiB": after,
+        "of which the program and 65k rays, MiB": before,
+        "of which the field, MiB": field,
+    }
+
+
+def main() -> None:
+    """Run all, print all."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--rays", type=float, default=1e6, help="rays in each timed scene")
+    parser.add_argument("--stream", type=float, default=1e7, help="rays of the memory test")
+    parser.add_argument("--json", type=Path, help="file to write the figures to")
+    parser.add_argument("--only", choices=["rods", "corner_cube", "michelson", "start", "memory"])
+    chosen = parser.parse_args()
+    side = round(np.sqrt(chosen.rays))
+    parts = {
+        "rods": lambda: bouncing(scenes.rods, side),
+        "corner_cube": lambda: bouncing(scenes.corner_cube, side),
+        "michelson": lambda: interferogram(side),
+        "start": start_up,
+        "memory": lambda: memory(chosen.stream),
+    }
+    results = {}
+    for name, part in parts.items():
+        if chosen.only in (None, name):
+            results[name] = part()
+            print(f"\n{name}")
+            for label, value in results[name].items():
+                print(f"  {label:45s} {value if isinstance(value, (str, int)) else format(value, '.3f')}")
+    if chosen.json:
+        chosen.json.write_text(json.dumps(results, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
