@@ -14,7 +14,6 @@ from fringetrace.field import complex_field
 from fringetrace.paths import Paths
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.trace import stream, trace
-from fringetrace.vectors import frame
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength, wavenumber
 
 
@@ -280,7 +279,7 @@ def centred(paths: Paths, parts: int = 1) -> Paths:
     """
     if paths.ccd is None:
         raise ValueError("centred: expected paths traced onto a CCD, got paths without one")
-    u, v, _ = frame(paths.ccd.normal, paths.ccd.up, "CCD")
+    u, v, _ = paths.ccd.axes
     fine = paths.pixel * parts
     shift = (np.floor(fine) + 0.5 - fine) * (paths.ccd.pitch / parts)
     continued = shift[:, 0] * (paths.direction @ v) + shift[:, 1] * (paths.direction @ u)

@@ -16,7 +16,6 @@ import numpy as np
 from fringetrace.interfaces import BeamSplitter
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.vectors import frame
 from fringetrace.waves import Array, FloatArray
 
 if TYPE_CHECKING:
@@ -121,10 +120,10 @@ def _drawing(scene: Scene, paths: Paths | None, colour: str, relief: str | None)
         drawing["routes"].append((name, [_line(paths, int(row), 0.3 * size) for row in rows]))
     if isinstance(paths.source, Beam):
         beam = paths.source
-        u, v, n = frame(beam.direction, beam.up, "Beam")
+        u, v, n = beam.axes
         drawing["source"] = (_rectangle(beam.centre, u, v, beam.size), n)
     if isinstance(paths.ccd, CCD):
-        u, v, n = frame(paths.ccd.normal, paths.ccd.up, "CCD")
+        u, v, n = paths.ccd.axes
         drawing["CCD"] = (_rectangle(paths.ccd.centre, u, v, paths.ccd.size), n)
     return drawing
 

@@ -164,8 +164,7 @@ def _tree(corners: FloatArray, tolerance: float) -> Tree:
     low, high = corners.min(axis=1) - slack, corners.max(axis=1) + slack
     leaves = 1 << max(0, (-(-count // leaf) - 1).bit_length())
     order = np.full(leaf * leaves, -1, dtype=np.int32)
-    bounds = np.ascontiguousarray(low.T), np.ascontiguousarray(high.T)
-    order[:count] = exact.arrange(*bounds, bounds[0] + bounds[1], leaves)
+    order[:count] = exact.arrange(np.ascontiguousarray((low + high).T), leaves)
     lower, upper = np.full((2 * leaves, 3), np.inf), np.full((2 * leaves, 3), -np.inf)
     filled = np.full((2, leaf * leaves, 3), np.array([np.inf, -np.inf])[:, None, None])
     filled[0, :count], filled[1, :count] = low[order[:count]], high[order[:count]]

@@ -45,49 +45,33 @@ def select(order, keys, start, stop, middle):
 
 
 @jit
-def girth(order, lower, upper, start, stop):
-    """Half the surface of the box around some triangles, times their number."""
-    x, y, z = 0.0, 0.0, 0.0
-    if stop > start:
-        low, high = lower[:, order[start]].copy(), upper[:, order[start]].copy()
-        for i in range(start, stop):
-            for k in range(3):
-                low[k] = min(low[k], lower[k, order[i]])
-                high[k] = max(high[k], upper[k, order[i]])
-        x, y, z = high[0] - low[0], high[1] - low[1], high[2] - low[2]
-    return (x * y + y * z + z * x) * (stop - start)
+def arrange(middle, leaves):
+    """Order of triangles for a complete binary tree: halved across the longest extent of their centres.
 
-
-@jit
-def arrange(lower, upper, middle, leaves):
-    """Order of triangles for a complete binary tree: halved across the axis with the least surface.
-
-    `lower`, `upper`, `middle` are (3, t): the triangles' boxes and their centres.
+    `middle` is (3, t).
     """
-    count = lower.shape[1]
+    count = middle.shape[1]
     order = np.arange(count)
     stack = [(0, LEAF * leaves)]
     while len(stack) > 0:
         start, size = stack.pop()
         half = size // 2
         stop = min(start + size, count)
-        # the halves of a node are full from the left: what is missing is missing at the end
-        if size <= LEAF or stop - start <= half:
-            if size > LEAF and stop > start:
-                stack.append((start, half))
+        if size <= LEAF or stop <= start:
             continue
-        cheapest, axis = np.inf, 0
-        for k in range(3):
-            select(order, middle[k], start, stop, start + half)
-            cost = girth(order, lower, upper, start, start + half) + girth(
-                order, lower, upper, start + half, stop
-            )
-            if cost < cheapest:
-                cheapest, axis = cost, k
-        if axis != 2:
+        # the halves of a node are full from the left: what is missing is missing at the end
+        if stop - start > half:
+            widest, axis = -1.0, 0
+            for k in range(3):
+                low, high = np.inf, -np.inf
+                for i in range(start, stop):
+                    value = middle[k, order[i]]
+                    low, high = min(low, value), max(high, value)
+                if high - low > widest:
+                    widest, axis = high - low, k
             select(order, middle[axis], start, stop, start + half)
+            stack.append((start + half, half))
         stack.append((start, half))
-        stack.append((start + half, half))
     return order
 
 

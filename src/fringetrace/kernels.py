@@ -72,7 +72,8 @@ def launch(first, rows, columns, centre, u, v, direction, width, height, start, 
 
 @jit
 def begin(
-    start, along, length, first, state, lost, amplitude, key, ray, last, bounces, reflections, straight, serial
+    start, along, length, first, state, lost, amplitude, key, ray, last, bounces, reflections, straight,
+    serial,
 ):  # fmt: skip
     """Fill a batch with rays that have met nothing yet; the amplitude is that of the path alone."""
     for i in range(len(start)):

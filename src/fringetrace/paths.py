@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from fringetrace.rays import Rays
 from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 
@@ -184,10 +183,13 @@ class Paths:
         ValueError
             If a path has too many bounces for its key to tell.
         """
-        pair = np.stack([self.key, self.bounces.astype(np.uint64)], axis=1)
-        kinds, which = np.unique(pair, axis=0, return_inverse=True)
-        digits = self._digits(kinds[:, 0], kinds[:, 1].astype(np.int64))
-        return np.asarray(((digits - 1) // 2 == surface).sum(axis=1)[which.ravel()], dtype=np.int64)
+        # digits are never 0: equal keys mean equal numbers of bounces
+        kinds = np.unique(self.key)
+        which = np.searchsorted(kinds, self.key)
+        bounces = np.zeros(len(kinds), dtype=np.int64)
+        bounces[which] = self.bounces
+        digits = self._digits(kinds, bounces)
+        return np.asarray(((digits - 1) // 2 == surface).sum(axis=1)[which], dtype=np.int64)
 
     def _digits(self, keys: Array, bounces: Array) -> Array:
         """Digits of keys, one for each bounce, padded with -1."""
@@ -284,7 +286,7 @@ def screen(ccd: CCD) -> tuple[float, ...]:
     -------
     15 floats, metres
     """
-    u, v, n = frame(ccd.normal, ccd.up, "CCD")
+    u, v, n = ccd.axes
     width, height = ccd.size
     numbers = [*ccd.centre, *n, *u, *v, 0.5 * width, 0.5 * height, ccd.focus]
     return tuple(float(number) for number in numbers)
@@ -305,7 +307,7 @@ def project(paths: Paths, ccd: CCD) -> Paths:
     Paths
         Those that reach the CCD are detected there.
     """
-    u, v, n = frame(ccd.normal, ccd.up, "CCD")
+    u, v, n = ccd.axes
     facing = paths.direction @ n
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = ((ccd.centre - paths.origin) @ n) / facing

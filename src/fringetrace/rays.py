@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.scene import Beam, as_names
-from fringetrace.vectors import frame, unit
+from fringetrace.vectors import unit
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 
@@ -145,7 +145,7 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
     rows, columns = beam.shape
     start, stop, _ = slice(start, stop).indices(rows * columns)
     count = max(0, stop - start)
-    u, v, n = frame(beam.direction, beam.up, "Beam")
+    u, v, n = beam.axes
     origin, direction = np.empty((count, 3)), np.empty((count, 3))
     kernels.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
     amplitude = np.broadcast_to(np.complex128(1.0), (count,))  # read-only, and takes no room

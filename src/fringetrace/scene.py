@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from functools import cached_property
 from numbers import Real
 from typing import Any
 
@@ -153,7 +154,7 @@ class Mesh:
         doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
         return Mesh(points, triangles[doubled > DEGENERATE * (sides**2).sum(axis=2).max(axis=1)], name)
 
-    @property
+    @cached_property
     def bounds(self) -> FloatArray:
         """(2, 3) float64, metres: lower and upper corner of what the faces span."""
         corners = self.vertices[self.faces].reshape(-1, 3)
@@ -261,6 +262,7 @@ class Gaussian:
         return np.asarray(np.exp(-(x * x + y * y) / self.waist**2), dtype=np.float64)
 
 
+Axes = tuple[FloatArray, FloatArray, FloatArray]
 Profile = Callable[[FloatArray, FloatArray], FloatArray]
 
 
@@ -331,12 +333,13 @@ class Beam:
     shape: tuple[int, int]
     profile: Profile | None = None
     passes: tuple[str, ...] = ()
+    axes: Axes = field(init=False, repr=False)  # of columns, rows, and the direction
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Beam centre"))
         object.__setattr__(self, "direction", checked_direction(self.direction, "Beam direction"))
         object.__setattr__(self, "up", checked_direction(self.up, "Beam up"))
-        frame(self.direction, self.up, "Beam")
+        object.__setattr__(self, "axes", frame(self.direction, self.up, "Beam"))
         object.__setattr__(self, "size", _checked_size(self.size, "Beam"))
         object.__setattr__(self, "shape", _checked_grid(self.shape, "Beam shape"))
         if self.profile is not None and not callable(self.profile):
@@ -382,12 +385,13 @@ class CCD:
     pitch: float
     shape: tuple[int, int]
     focus: float = 0.0
+    axes: Axes = field(init=False, repr=False)  # of columns, rows, and the normal
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "CCD centre"))
         object.__setattr__(self, "normal", checked_direction(self.normal, "CCD normal"))
         object.__setattr__(self, "up", checked_direction(self.up, "CCD up"))
-        frame(self.normal, self.up, "CCD")
+        object.__setattr__(self, "axes", frame(self.normal, self.up, "CCD"))
         object.__setattr__(self, "pitch", _positive(self.pitch, "CCD pitch"))
         object.__setattr__(self, "shape", _checked_grid(self.shape, "CCD shape"))
         if not (isinstance(self.focus, Real) and np.isfinite(self.focus)):
