@@ -26,8 +26,8 @@ BEHIND = 2.0**-18
 ASIDE = 2.0**-19
 
 # Columns of a batch's `state`: origin, direction, normal of the face last left, optical path (metres),
-# distance of the start from that face's nearest edge (unit box).
-OX, OY, OZ, DX, DY, DZ, NX, NY, NZ, WAY, EDGE = range(11)
+# distance of the start from that face's nearest edge (unit box), cosine of the ray to that normal.
+OX, OY, OZ, DX, DY, DZ, NX, NY, NZ, WAY, EDGE, LEAVING = range(12)
 # Columns of `met`: path to what a ray meets next, the point (metres), the normal, distance from the edge.
 PATH, PX, PY, PZ, FX, FY, FZ, RIM = range(8)
 
@@ -35,15 +35,14 @@ DETECTED, LEFT, ABSORBED, TRUNCATED, FAINT, ALIVE = 0, 1, 2, 3, 4, 5
 
 
 @part
-def restart(x, y, z, dx, dy, dz, nx, ny, nz):
-    """A point `SHIFT` above the face that a ray leaves.
+def restart(x, y, z, dx, dy, dz, nx, ny, nz, leaving, per):
+    """A point `SHIFT` above the face that a ray leaves at the cosine `leaving`, one over `per`.
 
     Along the ray: aside, it would pass silhouettes on the wrong side. A grazing ray takes the
     rest along the normal.
     """
-    leaving = nx * dx + ny * dy + nz * dz
     if abs(leaving) > GRAZING:
-        step = SHIFT / abs(leaving)
+        step = SHIFT * per
         return x + step * dx, y + step * dy, z + step * dz
     step = SHIFT / GRAZING
     side = (SHIFT if leaving > 0.0 else -SHIFT) - step * leaving
@@ -51,12 +50,17 @@ def restart(x, y, z, dx, dy, dz, nx, ny, nz):
 
 
 @part
-def bounced(dx, dy, dz, nx, ny, nz):
-    """A direction after reflection; one Newton step keeps its length at 1 over thousands of them."""
-    along = 2.0 * (nx * dx + ny * dy + nz * dz)
+def bounced(dx, dy, dz, nx, ny, nz, facing, steps):
+    """A direction after reflection at a face that it meets at the cosine `facing`.
+
+    Every eighth time, by the number of `steps`, a Newton step keeps the length at 1.
+    """
+    along = 2.0 * facing
     dx, dy, dz = dx - along * nx, dy - along * ny, dz - along * nz
-    scale = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
-    return dx * scale, dy * scale, dz * scale
+    if steps & 7 == 0:
+        scale = 1.5 - 0.5 * (dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = dx * scale, dy * scale, dz * scale
+    return dx, dy, dz
 
 
 @jit
@@ -119,7 +123,10 @@ def aim(
             if not hopeful:
                 continue
         if own:
-            x, y, z = restart(x, y, z, dx, dy, dz, state[row, NX], state[row, NY], state[row, NZ])
+            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+            leaving = nx * dx + ny * dy + nz * dz
+            state[row, LEAVING] = leaving
+            x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz, leaving, 1.0 / abs(leaving))
         else:
             along = x * dx + y * dy + z * dz
             qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
@@ -193,7 +200,8 @@ def softly(planes, tri, x, y, z, folds, margin):
 
 @jit
 def doubted(
-    x, y, z, dx, dy, dz, row, own, guess, limit, leaving, last, state, straight, first, oriented, frame,
+    x, y, z, dx, dy, dz, row, own, guess, limit, leaving, last, state, straight, first, oriented, closed,
+    frame,
     planes, corners, order, lower, upper,
 ):  # fmt: skip
     """Exact hit of a doubtful ray before `limit`: path, triangle, a point inside its edges."""
@@ -221,6 +229,14 @@ def doubted(
         x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
         tolerance,
     )  # fmt: skip
+    if tri < 0 and side == -1 and closed and limit == np.inf:
+        # along a face to the very edge of the next: from a little further inside it cannot be missed
+        nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+        x, y, z = x - 8.0 * tolerance * nx, y - 8.0 * tolerance * ny, z - 8.0 * tolerance * nz
+        path, tri = decide(
+            x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
+            tolerance,
+        )  # fmt: skip
     inside = np.inf
     if tri >= 0:
         x, y, z = x + path * dx, y + path * dy, z + path * dz
@@ -283,7 +299,8 @@ def measure(
             local = not doubt and abs(leaving) > GRAZING
             exact, tri, ex, ey, ez, rest = doubted(
                 x, y, z, dx, dy, dz, row, own, np.int64(-1) if local else guess,
-                2.0 * MARGIN if local else np.inf, leaving, last, state, straight, first, oriented, frame,
+                2.0 * MARGIN if local else np.inf, leaving, last, state, straight, first, oriented,
+                closed, frame,
                 planes, corners, order, lower, upper,
             )  # fmt: skip
             if tri >= 0 or not local:
@@ -340,13 +357,14 @@ def rebound(
         gx, gy, gz = state[row, OX], state[row, OY], state[row, OZ]
         dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
         x, y, z = (gx - cx) * scale, (gy - cy) * scale, (gz - cz) * scale
-        leaving = state[row, NX] * dx + state[row, NY] * dy + state[row, NZ] * dz
-        distance, px, py, pz, inside = np.inf, x, y, z, 0.0
+        leaving = state[row, LEAVING]
+        distance, px, py, pz, inside, facing, inverted = np.inf, x, y, z, 0.0, 0.0, 0.0
         if guess >= 0:
             k = np.uintp(guess)
             facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
             height = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3]
-            distance = -height / facing
+            inverted = 1.0 / facing
+            distance = -height * inverted
             px, py, pz = x + distance * dx, y + distance * dy, z + distance * dz
             inside = inset(planes, k, px, py, pz)
             doubt = not (distance > MARGIN and distance < 1e300)
@@ -361,14 +379,20 @@ def rebound(
             near = not softly(planes, last[row], x, y, z, gentle[last[row]], frame[5])
         if doubt or near:
             doubtful += 1
+            k = np.uintp(last[row])
+            state[row, NX], state[row, NY], state[row, NZ] = planes[k, 0], planes[k, 1], planes[k, 2]
             local = not doubt and abs(leaving) > GRAZING  # see `measure`
             exact, tri, ex, ey, ez, rest = doubted(
                 x, y, z, dx, dy, dz, row, True, np.int64(-1) if local else guess,
-                2.0 * MARGIN if local else np.inf, leaving, last, state, straight, 0, oriented, frame,
+                2.0 * MARGIN if local else np.inf, leaving, last, state, straight, 0, oriented, closed, frame,
                 planes, corners, order, lower, upper,
             )  # fmt: skip
             if tri >= 0 or not local:
                 distance, guess, px, py, pz, inside = exact, tri, ex, ey, ez, rest
+                if guess >= 0:
+                    k = np.uintp(guess)
+                    facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
+                    inverted = 1.0 / facing
         path = distance * unscale
         reach = np.inf
         if has_screen:
@@ -394,15 +418,15 @@ def rebound(
         nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
         height = nx * px + ny * py + nz * pz + planes[k, 3]
         x, y, z = px - height * nx, py - height * ny, pz - height * nz
-        dx, dy, dz = bounced(dx, dy, dz, nx, ny, nz)
+        dx, dy, dz = bounced(dx, dy, dz, nx, ny, nz, facing, steps + 1)
         gx, gy, gz = cx + x * unscale, cy + y * unscale, cz + z * unscale
         state[kept, OX], state[kept, OY], state[kept, OZ] = gx, gy, gz
         state[kept, DX], state[kept, DY], state[kept, DZ] = dx, dy, dz
-        state[kept, NX], state[kept, NY], state[kept, NZ] = nx, ny, nz
-        state[kept, WAY], state[kept, EDGE], last[kept] = state[row, WAY] + path, inside, guess
+        state[kept, WAY], state[kept, EDGE] = state[row, WAY] + path, inside
+        state[kept, LEAVING], last[kept] = -facing, guess
         key[kept] = key[row] * base + np.uint64(digit[k])
         ray[kept] = ray[row]
-        x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz)
+        x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz, -facing, abs(inverted))
         origin32[kept, 0], origin32[kept, 1], origin32[kept, 2] = x, y, z
         direction32[kept, 0], direction32[kept, 1], direction32[kept, 2] = dx, dy, dz
         kept += 1
@@ -452,7 +476,7 @@ def interact(
             way += met[row, PATH]
             steps += 1
             here = here * base + np.uint64(2 * surface + 1)
-            rx, ry, rz = bounced(dx, dy, dz, nx, ny, nz)
+            rx, ry, rz = bounced(dx, dy, dz, nx, ny, nz, nx * dx + ny * dy + nz * dz, steps)
             if not plain:
                 r, t = reflection[surface], transmission[surface]
                 r2, t2 = r.real * r.real + r.imag * r.imag, t.real * t.real + t.imag * t.imag
