@@ -34,18 +34,23 @@ def corner_cube() -> tuple[ft.Scene, ft.Beam]:
         plate = ft.shapes.plate(0.98 * side, 2.0 * side, thickness=0.02 * side)
         wedge = ft.vectors.rotation(np.cross(axis, across), 0.5e-3 * sign)
         plates.append(plate.moved(1.8 * side * axis + sign * 0.5 * side * across, wedge @ facing))
-    surfaces = [ft.Surface(mesh, ft.Mirror()) for mesh in (cube, *plates)]
+    mesh = merged(cube, *plates)
     start = 1.2 * side * axis
     beam = ft.Beam(start, -axis + 0.05 * across, (0, 0, 1), (0.4 * side, 0.4 * side), (1000, 1000))
-    return ft.Scene(surfaces), beam
+    return ft.Scene([ft.Surface(mesh, ft.Mirror())]), beam
+
+
+def merged(*meshes: ft.Mesh) -> ft.Mesh:
+    """Several meshes as one."""
+    shift = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, shift, strict=False)]
+    return ft.Mesh(np.concatenate([mesh.vertices for mesh in meshes]), np.concatenate(faces))
 
 
 def joint(scene: ft.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """All triangles of a scene as one float32 mesh in the unit box; vertices, faces, centre, scale."""
-    meshes = [surface.mesh for surface in scene.surfaces]
-    shift = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
-    vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    faces = np.concatenate([mesh.faces + start for mesh, start in zip(meshes, shift, strict=False)])
+    mesh = merged(*(surface.mesh for surface in scene.surfaces))
+    vertices, faces = mesh.vertices, mesh.faces
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     centre, scale = 0.5 * (low + high), 2.0 / float((high - low).max())
     return ((vertices - centre) * scale).astype(np.float32), faces.astype(np.int32), centre, scale

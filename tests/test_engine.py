@@ -218,19 +218,24 @@ def test_no_ray_escapes_through_a_vertex_or_an_edge(name):
 
 @pytest.mark.parametrize("relief", [0.0, 1e-6, 1e-3, 0.3])
 @pytest.mark.parametrize("direction", [(0.0, 0.0, -1.0), (0.3, -0.2, -1.0), (1.0, 1.0, -1.0)])
-@pytest.mark.parametrize("backed", [False, True], ids=["alone", "another sheet behind"])
-def test_no_ray_falls_through_a_vertex_of_an_open_height_map(backed, direction, relief):
+@pytest.mark.parametrize("behind", ["nothing", "a sheet", "a surface"])
+def test_no_ray_falls_through_a_vertex_of_an_open_height_map(behind, direction, relief):
     # steep ridges are silhouettes of slanting light: those it may miss
     relief = relief if direction[0] == 0.0 else min(relief, 1e-3)
     front = shapes.height_map(relief * np.random.default_rng(3).uniform(size=(101, 101)), 0.1)
-    mesh = merged(front, shapes.plate(30.0, 30.0).moved((0, 0, -3))) if backed else front
+    back = shapes.plate(30.0, 30.0).moved((0, 0, -3))
+    scene = {
+        "nothing": mirrors(front),
+        "a sheet": mirrors(merged(front, back)),
+        "a surface": mirrors(front, back),
+    }[behind]
     grid = front.vertices.reshape(101, 101, 3)[10:-10, 10:-10]
     cut = 0.5 * (grid[1:, 1:] + grid[:-1, :-1])
     edges = 0.5 * (grid[1:] + grid[:-1]), 0.5 * (grid[:, 1:] + grid[:, :-1]), cut
     targets = np.concatenate([points.reshape(-1, 3) for points in (grid, *edges)])
     step = np.array(direction)
     rays = ft.Rays(targets - 2.0 * step, np.broadcast_to(step, targets.shape))
-    paths = ft.trace(mirrors(mesh), rays, max_bounces=1)
+    paths = ft.trace(scene, rays, max_bounces=1)
     assert (paths.bounces == 1).all()
     np.testing.assert_allclose(paths.length, 2.0 * np.linalg.norm(step), rtol=1e-14)
 
@@ -471,6 +476,8 @@ def test_many_surfaces_give_what_one_mesh_gives():
     apart = ft.trace(mirrors(*parts), rays, max_bounces=20, record=True)
     whole = ft.trace(mirrors(merged(*parts)), rays, max_bounces=20, record=True)
     first = np.cumsum([0] + [len(mesh.faces) for mesh in parts])[:-1]
+    for paths in (apart, whole):
+        assert ends(ft.trace(paths.scene, rays, max_bounces=20)) == ends(paths)
     assert (np.bincount(apart.surface[apart.surface >= 0], minlength=12)[:11] > 0).all()
     np.testing.assert_array_equal(apart.triangle + first[apart.surface], whole.triangle)
     np.testing.assert_allclose(apart.points, whole.points, rtol=0, atol=1e-11)
@@ -515,8 +522,37 @@ def test_a_scene_at_another_place_gives_the_same_picture():
     np.testing.assert_allclose(there.points - offset, here.points, rtol=0, atol=100 * rounding)
 
 
-lengths = st.floats(1e-6, 1e6)
 seeds = st.integers(0, 2**32 - 1)
+
+
+@settings(max_examples=40, deadline=None)
+@given(count=st.integers(1, 8), aligned=st.booleans(), seed=seeds)
+def test_any_heap_of_surfaces_agrees_with_the_twin(count, aligned, seed):
+    rng = np.random.default_rng(seed)
+    heap = []
+    for kind in rng.integers(4, size=count):
+        mesh = (
+            shapes.plate(1.0, 1.0),
+            box(*rng.uniform(0.1, 1.0, 3)),
+            shapes.icosphere(0.5, 1),
+            shapes.height_map(0.1 * rng.uniform(size=(4, 4)), 0.3),
+        )[kind]
+        size, place = 10.0 ** rng.uniform(-2, 0), rng.uniform(-1, 1, 3)
+        if aligned:  # faces in the same planes, edges in a row
+            size, place = 0.5, np.round(4 * place) / 4
+        turn = np.eye(3) if aligned else rotation(rng.normal(size=3), rng.uniform(0, 6))
+        heap.append(ft.Mesh(mesh.vertices * size, mesh.faces).moved(place, turn))
+    start, part = rng.uniform(-2, 2, (100, 3)), rng.integers(count, size=100)
+    aim = np.array([mesh.bounds.mean(axis=0) for mesh in heap])[part] + 0.1 * rng.normal(size=(100, 3))
+    rays = ft.Rays(start, aim - start)
+    paths = ft.trace(mirrors(*heap), rays, max_bounces=10, record=True)
+    assert ends(ft.trace(paths.scene, rays, max_bounces=10)) == ends(paths)
+    verdict = twin.judge(paths)
+    assert (verdict.itself, verdict.wrong) == (0, ())
+    assert verdict.distance < 1e-10  # faces may be grazed
+
+
+lengths = st.floats(1e-6, 1e6)
 
 
 @settings(max_examples=40, deadline=None)

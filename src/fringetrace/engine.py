@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from fringetrace.rays import Batch, Ends
 from fringetrace.scene import Mesh, Scene, Surface
+from fringetrace.triangles import weld
 from fringetrace.waves import Array, FloatArray
 
 IntArray = npt.NDArray[np.int64]
@@ -26,7 +27,7 @@ SPREAD = 64.0
 CLEAR = 1e-3
 # A surface is a plane if no vertex stands off it by more than this part of the unit box; around a
 # surface there is this much room, beyond all that float32 and restarts move a ray.
-FLAT, ROOM = 1e-15, 1e-4
+FLAT, ROOM = 1e-14, 1e-4
 # How many faces lend their planes to the test for that, and from how many vertices on a box stands in.
 FACES, MANY = 16, 10000
 
@@ -250,6 +251,8 @@ def _body(surfaces: tuple[Surface, ...], members: tuple[int, ...], first: int) -
     corners = local[faces]
     planes = _planes(corners)
     oriented, closed, cosine = _topology(faces, planes[:, :3])
+    if not closed:  # perhaps only because equal vertices have different numbers
+        oriented, closed, cosine = _topology(weld(local, faces)[1], planes[:, :3])
     sharpest = float(np.fmin.reduce(cosine, axis=None, initial=1.0))
     frame = np.empty(7)
     frame[:3], frame[3] = centre, scale
@@ -296,16 +299,31 @@ def _apart(one: Mesh, other: Mesh) -> bool:
     return bool(gap > CLEAR * size)
 
 
+def _leaky(mesh: Mesh) -> bool:
+    """Whether a ray may slip through one of Embree's holes at vertices to what is behind: open, not flat."""
+    corners = mesh.vertices[mesh.faces]
+    first = corners[0]
+    normal = np.cross(first[1] - first[0], first[2] - first[0])
+    normal /= np.linalg.norm(normal)
+    size = np.ptp(mesh.bounds, axis=0).max()
+    if np.abs((corners - first[0]) @ normal).max() < FLAT * size:
+        return False
+    edges = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
+    number = np.sort(edges[:, 0] * len(mesh.vertices) + edges[:, 1])
+    return bool(len(number) % 2 or (number[::2] != number[1::2]).any())
+
+
 def _groups(surfaces: tuple[Surface, ...], alone: frozenset[int]) -> list[tuple[int, ...]]:
-    """Which surfaces share a body: those of a size that stand clear of each other.
+    """Which surfaces share a body: closed or flat ones of a size that stand clear of each other.
 
     What touches or nests stays apart, so that thin gaps are between bodies, where float64 decides.
     """
+    apart = alone | {i for i, surface in enumerate(surfaces) if _leaky(surface.mesh)}
     groups: list[list[int]] = []
     for i, surface in enumerate(surfaces):
         home = None
-        for group in groups if i not in alone else ():
-            if group[0] in alone:
+        for group in groups if i not in apart else ():
+            if group[0] in apart:
                 continue
             bounds = np.array([surfaces[k].mesh.bounds for k in [*group, i]])
             smallest = np.ptp(bounds, axis=1).max(axis=1).min()
@@ -351,31 +369,37 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
     return engine
 
 
-def aim(engine: Engine, batch: Batch, rows: int, hits: Hits, number: int, fresh: bool) -> int:
+def aim(
+    engine: Engine, batch: Batch, rows: int, hits: Hits, number: int, fresh: bool, cull: bool = True
+) -> int:
     """Float32 rays towards a body, into `hits`; returns how many of the batch can meet it."""
     from fringetrace import kernels
 
     body = engine.bodies[number]
     count: int = kernels.aim(
         rows, batch.state, batch.last, body.frame, body.first, body.stop, engine.owner,
-        np.array(body.surfaces), body.flat, *body.boxes, hits.met, hits.triangle,
+        np.array(body.surfaces), body.flat, *body.boxes, cull, hits.met, hits.triangle,
         fresh, hits.origin32, hits.direction32, hits.sent,
     )  # fmt: skip
     return count
 
 
 def _second(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.int32], hits: Hits) -> None:
-    """A second opinion, a little aside, on suspicious answers; -2 where the two differ."""
+    """Other opinions, a little aside, on suspicious answers; -2 where one of them differs."""
     from fringetrace import kernels
 
     found = kernels.suspect(
         hits.sent, count, prim, batch.state, batch.last, body.first, body.stop, body.closed,
         body.frame[4], body.planes, hits.origin32, hits.direction32, hits.asked,
     )  # fmt: skip
-    if found:
-        rows = hits.asked[:found]
-        again = body.embree.run(hits.origin32[:found], hits.direction32[:found])
-        prim[rows[again != prim[rows]]] = -2
+    rows, moved = hits.asked[:found], np.empty((found, 3), dtype=np.float32)
+    first = prim[rows]
+    for turn in range(3 if found else 0):
+        kernels.beside(
+            hits.sent, hits.asked, found, batch.state, batch.last, body.first, body.stop, hits.origin32,
+            hits.direction32, turn, moved,
+        )  # fmt: skip
+        prim[rows[body.embree.run(moved, hits.direction32[:found]) != first]] = -2
 
 
 def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:

@@ -92,14 +92,15 @@ def begin(
 
 @jit
 def aim(
-    total, state, last, frame, first, stop, owner, members, flat, lower, upper, met, triangle, fresh,
+    total, state, last, frame, first, stop, owner, members, flat, lower, upper, cull, met, triangle, fresh,
     origin32, direction32, sent,
 ):  # fmt: skip
     """Collect, in float32 and the unit box of a body, the rays that can meet it; return how many.
 
     `members` are the body's surfaces, in boxes `lower` to `upper`; from a `flat` one a ray does not
     come back to it. A ray that just left this body restarts `SHIFT` above its last triangle; one
-    from outside starts at the bounding sphere. `fresh`: forget what each ray met before.
+    from outside starts at the bounding sphere. `cull`: leave out those that cannot meet anything.
+    `fresh`: forget what each ray met before.
     """
     cx, cy, cz, scale, radius = frame[0], frame[1], frame[2], frame[3], frame[4]
     count = 0
@@ -111,7 +112,7 @@ def aim(
         y = (state[row, OY] - cy) * scale
         z = (state[row, OZ] - cz) * scale
         own = first <= last[row] < stop
-        if len(members) > 1 or (own and flat[0]):
+        if cull and (len(members) > 1 or (own and flat[0])):
             ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
             left = owner[last[row]] if own else -1
             hopeful = False
@@ -148,12 +149,12 @@ def aim(
 @jit
 def suspect(
     sent, count, prim, state, last, first, stop, closed, radius, planes, origin32, direction32, asked
-):  # fmt: skip
-    """Move to the front, a little aside, the rays whose answer wants a second opinion.
+):
+    """Move to the front the rays whose answer wants a second opinion; return how many.
 
-    Embree has holes at exact vertices. Suspicious are misses of an open body, and, of rays that
-    have not just left it, misses of a closed body from within its bounding sphere and hits on
-    its inside.
+    Embree has holes at exact vertices, and float32 blurs the rim of an open body. Suspicious are
+    misses of an open body, and, of rays that have not just left it, misses of a closed body from
+    within its bounding sphere and hits on its inside.
     """
     found = 0
     inner = (1.0 - 1e-4) * radius * radius
@@ -171,20 +172,43 @@ def suspect(
                 continue
         elif tri >= 0:
             continue
-        ax, ay, az = 0.61 * ASIDE, -0.47 * ASIDE, 0.64 * ASIDE
-        if first <= last[row] < stop:  # not through the face just left
-            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
-            up = ax * nx + ay * ny + az * nz
-            ax, ay, az = ax - up * nx, ay - up * ny, az - up * nz
-        origin32[found, 0] = origin32[i, 0] + ax
-        origin32[found, 1] = origin32[i, 1] + ay
-        origin32[found, 2] = origin32[i, 2] + az
-        direction32[found, 0] = direction32[i, 0]
-        direction32[found, 1] = direction32[i, 1]
-        direction32[found, 2] = direction32[i, 2]
+        for k in range(3):
+            origin32[found, k], direction32[found, k] = origin32[i, k], direction32[i, k]
         asked[found] = i
         found += 1
     return found
+
+
+@jit
+def beside(sent, asked, found, state, last, first, stop, origin32, direction32, turn, moved):
+    """Move suspicious rays `ASIDE`, across themselves, to the side `turn` (0, 1, 2: 120 degrees apart).
+
+    Whichever way a rim runs, one of the three sides is well inside it. None goes through the face
+    just left.
+    """
+    cos, sin = np.cos(2.0 * np.pi * turn / 3.0), np.sin(2.0 * np.pi * turn / 3.0)
+    for i in range(found):
+        row = np.uintp(sent[asked[i]])
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        # u and v across the ray, from the axis that it is least along
+        if abs(dx) <= abs(dy) and abs(dx) <= abs(dz):
+            ux, uy, uz = 0.0, dz, -dy
+        elif abs(dy) <= abs(dz):
+            ux, uy, uz = -dz, 0.0, dx
+        else:
+            ux, uy, uz = dy, -dx, 0.0
+        size = ASIDE / np.sqrt(ux * ux + uy * uy + uz * uz)
+        ux, uy, uz = ux * size, uy * size, uz * size
+        vx, vy, vz = dy * uz - dz * uy, dz * ux - dx * uz, dx * uy - dy * ux
+        ax, ay, az = cos * ux + sin * vx, cos * uy + sin * vy, cos * uz + sin * vz
+        if first <= last[row] < stop:
+            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+            up = ax * nx + ay * ny + az * nz
+            if up * (nx * dx + ny * dy + nz * dz) < 0.0:
+                ax, ay, az = ax - up * nx, ay - up * ny, az - up * nz
+        moved[i, 0] = origin32[i, 0] + ax
+        moved[i, 1] = origin32[i, 1] + ay
+        moved[i, 2] = origin32[i, 2] + az
 
 
 @jit
@@ -201,8 +225,7 @@ def softly(planes, tri, x, y, z, folds, margin):
 @jit
 def doubted(
     x, y, z, dx, dy, dz, row, own, guess, limit, leaving, last, state, straight, first, oriented, closed,
-    frame,
-    planes, corners, order, lower, upper,
+    frame, planes, corners, order, lower, upper,
 ):  # fmt: skip
     """Exact hit of a doubtful ray before `limit`: path, triangle, a point inside its edges."""
     radius, tolerance = frame[4], frame[6]
@@ -279,7 +302,7 @@ def measure(
             k = np.uintp(guess)
             facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
             height = planes[k, 0] * x + planes[k, 1] * y + planes[k, 2] * z + planes[k, 3]
-            distance = -height / facing
+            distance = -height * (1.0 / facing)
             px, py, pz = x + distance * dx, y + distance * dy, z + distance * dz
             inside = inset(planes, k, px, py, pz)
             doubt = not (distance > MARGIN and distance < 1e300)

@@ -316,16 +316,12 @@ def write_pictures(measurement: Measurement, folder: Path) -> None:
     measurement : Measurement
     folder : Path
     """
-    from matplotlib.figure import Figure
-
     from fringetrace import views
 
     m = measurement
     image = views.interferogram(m.interferogram, m.pitch, wavelength=m.wavelength, title="Interferogram")
     views.save(image, folder / "interferogram.png")
-    figure = Figure(figsize=(12.0, 5.0))
-    figure.subplots_adjust(left=0.06, right=0.91, bottom=0.11, top=0.92, wspace=0.4)
-    left, right = figure.subplots(1, 2)
+    left, right = views.pair()
     views.height(m.height, m.pitch, left, title="Height, measured")
     views.residual(m.residual, m.pitch, right, wavelength=m.wavelength, title="Measured − mesh")
-    views.save(figure, folder / "height.png")
+    views.save(left, folder / "height.png")

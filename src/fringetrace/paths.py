@@ -306,7 +306,14 @@ def project(paths: Paths, ccd: CCD) -> Paths:
     -------
     Paths
         Those that reach the CCD are detected there.
+
+    Raises
+    ------
+    ValueError
+        If the paths were traced onto a CCD already.
     """
+    if paths.ccd is not None:
+        raise ValueError("project: expected paths traced without a CCD, got paths that have one")
     u, v, n = ccd.axes
     facing = paths.direction @ n
     with np.errstate(divide="ignore", invalid="ignore"):

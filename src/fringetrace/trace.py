@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from numbers import Real
 from queue import Empty, SimpleQueue
 from typing import TypeVar
 
@@ -75,7 +76,7 @@ def _plan(
     if ccd is not None and not isinstance(ccd, CCD):
         raise TypeError(f"trace: expected a CCD or None, got {type(ccd).__name__}")
     _whole(max_bounces, 0, "max_bounces")
-    if not (np.isfinite(min_amplitude) and min_amplitude >= 0.0):
+    if not (isinstance(min_amplitude, Real) and np.isfinite(min_amplitude) and min_amplitude >= 0.0):
         raise ValueError(f"min_amplitude: expected a number of at least 0, got {min_amplitude!r}")
     passed = frozenset(scene.index(name) for name in source.passes)
     interfaces = [surface.interface for surface in scene.surfaces]
@@ -198,7 +199,7 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
             first if ordered else -1, serials,
         )  # fmt: skip
         if simple:
-            aim(plan.engine, state, count, hits, 0, True)
+            aim(plan.engine, state, count, hits, 0, True, cull=False)
         if record is not None:
             _noted(record, plan, before, part(ends, 0, ended), old, hits)
     return Chunk(ends, ended, rays, segments, doubtful, record)
@@ -207,7 +208,8 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
 def _recorded(plan: Plan, record: _Record, ends: Ends) -> dict[str, Array]:
     """The record as the padded tables of `Paths`."""
     depth = int(ends.bounces.max(initial=0))
-    triangle = np.stack([*record.triangles, record.triangles[0]], axis=1)[ends.serial, :depth]
+    none = np.full(len(record.points[0]), -1, dtype=np.int64)
+    triangle = np.stack([*record.triangles, none], axis=1)[ends.serial, :depth]
     surface = np.where(triangle >= 0, plan.engine.owner[triangle], -1).astype(np.int64)
     points = np.full((len(triangle), depth + 2, 3), np.nan)
     points[:, : depth + 1] = np.stack(record.points[: depth + 1], axis=1)[ends.serial]

@@ -34,6 +34,21 @@ def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
     return axes
 
 
+def pair() -> tuple[Axes, Axes]:
+    """Two axes side by side in a figure of their own, with room for a colour bar beside each.
+
+    Returns
+    -------
+    left, right : matplotlib Axes
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 5.0))
+    figure.subplots_adjust(left=0.06, right=0.91, bottom=0.11, top=0.92, wspace=0.4)
+    left, right = figure.subplots(1, 2)
+    return left, right
+
+
 def _scale_bar(ax: Axes, width: float, unit: str) -> None:
     """A bar of about a fifth of the width, 1, 2 or 5 times a power of ten long."""
     from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
