@@ -385,21 +385,28 @@ def aim(
 
 
 def _second(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.int32], hits: Hits) -> None:
-    """Other opinions, a little aside, on suspicious answers; -2 where one of them differs."""
+    """Other opinions, a little aside, on suspicious answers; -2 where one of them differs.
+
+    Three of rays that come from elsewhere, one of rays that have just left this body.
+    """
     from fringetrace import kernels
 
-    found = kernels.suspect(
-        hits.sent, count, prim, batch.state, batch.last, body.first, body.stop, body.closed,
-        body.frame[4], body.planes, hits.origin32, hits.direction32, hits.asked,
-    )  # fmt: skip
-    rows, moved = hits.asked[:found], np.empty((found, 3), dtype=np.float32)
-    first = prim[rows]
-    for turn in range(3 if found else 0):
-        kernels.beside(
-            hits.sent, hits.asked, found, batch.state, batch.last, body.first, body.stop, hits.origin32,
-            hits.direction32, turn, moved,
+    for leaving, turns in ((False, 3), (True, 0 if body.closed else 1)):
+        if turns == 0:
+            continue
+        found = kernels.suspect(
+            hits.sent, count, prim, batch.state, batch.last, body.first, body.stop, body.closed,
+            body.frame[4], body.planes, hits.origin32, leaving, hits.asked,
         )  # fmt: skip
-        prim[rows[body.embree.run(moved, hits.direction32[:found]) != first]] = -2
+        rows = hits.asked[:found]
+        moved, heading = np.empty((2, found, 3), dtype=np.float32)
+        first = prim[rows]
+        for turn in range(turns if found else 0):
+            kernels.beside(
+                hits.sent, hits.asked, found, batch.state, batch.last, body.first, body.stop,
+                hits.origin32, turn, moved, heading,
+            )  # fmt: skip
+            prim[rows[body.embree.run(moved, heading) != first]] = -2
 
 
 def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:

@@ -112,6 +112,17 @@ def aim(
         y = (state[row, OY] - cy) * scale
         z = (state[row, OZ] - cz) * scale
         own = first <= last[row] < stop
+        step = 0.0
+        if not own:
+            along = x * dx + y * dy + z * dz
+            qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
+            square = radius * radius - (qx * qx + qy * qy + qz * qz)
+            if square < 0.0:
+                continue
+            reach = np.sqrt(square)
+            if along > reach:
+                continue
+            step = -along - reach if along < -reach else -BEHIND
         if cull and (len(members) > 1 or (own and flat[0])):
             ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
             left = owner[last[row]] if own else -1
@@ -129,15 +140,6 @@ def aim(
             state[row, LEAVING] = leaving
             x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz, leaving, 1.0 / abs(leaving))
         else:
-            along = x * dx + y * dy + z * dz
-            qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
-            square = radius * radius - (qx * qx + qy * qy + qz * qz)
-            if square < 0.0:
-                continue
-            reach = np.sqrt(square)
-            if along > reach:
-                continue
-            step = -along - reach if along < -reach else -BEHIND
             x, y, z = x + step * dx, y + step * dy, z + step * dz
         origin32[count, 0], origin32[count, 1], origin32[count, 2] = x, y, z
         direction32[count, 0], direction32[count, 1], direction32[count, 2] = dx, dy, dz
@@ -147,40 +149,36 @@ def aim(
 
 
 @jit
-def suspect(
-    sent, count, prim, state, last, first, stop, closed, radius, planes, origin32, direction32, asked
-):
-    """Move to the front the rays whose answer wants a second opinion; return how many.
+def suspect(sent, count, prim, state, last, first, stop, closed, radius, planes, origin32, leaving, asked):
+    """List the rays whose answer wants other opinions, of those that are just `leaving` the body or not.
 
     Embree has holes at exact vertices, and float32 blurs the rim of an open body. Suspicious are
     misses of an open body, and, of rays that have not just left it, misses of a closed body from
-    within its bounding sphere and hits on its inside.
+    within its bounding sphere and hits on its inside. Returns how many.
     """
     found = 0
     inner = (1.0 - 1e-4) * radius * radius
     for i in range(count):
         row = np.uintp(sent[i])
         tri = prim[i]
-        if closed:
-            if first <= last[row] < stop:
+        if (first <= last[row] < stop) != leaving:
+            continue
+        if closed and tri >= 0:
+            facing = planes[tri, 0] * state[row, DX] + planes[tri, 1] * state[row, DY]
+            if facing + planes[tri, 2] * state[row, DZ] <= 0.0:
                 continue
-            dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
-            if tri >= 0:
-                if planes[tri, 0] * dx + planes[tri, 1] * dy + planes[tri, 2] * dz <= 0.0:
-                    continue
-            elif origin32[i, 0] ** 2 + origin32[i, 1] ** 2 + origin32[i, 2] ** 2 >= inner:
+        elif closed:
+            if origin32[i, 0] ** 2 + origin32[i, 1] ** 2 + origin32[i, 2] ** 2 >= inner:
                 continue
         elif tri >= 0:
             continue
-        for k in range(3):
-            origin32[found, k], direction32[found, k] = origin32[i, k], direction32[i, k]
         asked[found] = i
         found += 1
     return found
 
 
 @jit
-def beside(sent, asked, found, state, last, first, stop, origin32, direction32, turn, moved):
+def beside(sent, asked, found, state, last, first, stop, origin32, turn, moved, heading):
     """Move suspicious rays `ASIDE`, across themselves, to the side `turn` (0, 1, 2: 120 degrees apart).
 
     Whichever way a rim runs, one of the three sides is well inside it. None goes through the face
@@ -206,9 +204,10 @@ def beside(sent, asked, found, state, last, first, stop, origin32, direction32, 
             up = ax * nx + ay * ny + az * nz
             if up * (nx * dx + ny * dy + nz * dz) < 0.0:
                 ax, ay, az = ax - up * nx, ay - up * ny, az - up * nz
-        moved[i, 0] = origin32[i, 0] + ax
-        moved[i, 1] = origin32[i, 1] + ay
-        moved[i, 2] = origin32[i, 2] + az
+        moved[i, 0] = origin32[asked[i], 0] + ax
+        moved[i, 1] = origin32[asked[i], 1] + ay
+        moved[i, 2] = origin32[asked[i], 2] + az
+        heading[i, 0], heading[i, 1], heading[i, 2] = dx, dy, dz
 
 
 @jit

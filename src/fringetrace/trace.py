@@ -138,9 +138,10 @@ class Workspace:
     ends: Ends
 
     @staticmethod
-    def blank(rows: int) -> Workspace:
-        """Room for so many rays under way."""
-        return Workspace(blank(Batch, rows), Hits.blank(rows), blank(Ends, rows))
+    def blank(rows: int, branches: int) -> Workspace:
+        """Room for so many rays, each of which may split into some branches."""
+        room = rows * branches
+        return Workspace(blank(Batch, room), Hits.blank(room), blank(Ends, room))
 
 
 def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, old: int, hits: Hits) -> None:
@@ -182,7 +183,7 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
             continue
         if plan.splits and 2 * count > len(space.state.ray):
             space.state, space.hits = grown(space.state, 4 * count), Hits.blank(4 * count)
-        if not ordered and ended + 2 * count > len(ends.ray):
+        if not ordered and ended + (2 if plan.splits else 1) * count > len(ends.ray):
             space.ends = ends = grown(ends, 2 * (ended + 2 * count))
         state, hits = space.state, space.hits
         segments += count
@@ -289,8 +290,8 @@ def _pooled(
 class _Workspaces:
     """One workspace for each thread, handed on from chunk to chunk."""
 
-    def __init__(self, rows: int) -> None:
-        self.rows = rows
+    def __init__(self, plan: Plan, chunk: int) -> None:
+        self.rows, self.branches = min(chunk, plan.total), 4 if plan.splits else 1
         self.idle: SimpleQueue[Workspace] = SimpleQueue()
 
     @contextmanager
@@ -299,14 +300,14 @@ class _Workspaces:
         try:
             space = self.idle.get_nowait()
         except Empty:
-            space = Workspace.blank(self.rows)
+            space = Workspace.blank(self.rows, self.branches)
         yield space
         self.idle.put(space)
 
 
 def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress | None) -> Iterator[Paths]:
     """Paths of consecutive rays."""
-    spaces = _Workspaces(min(chunk, plan.total))
+    spaces = _Workspaces(plan, chunk)
 
     def work(first: int, stop: int) -> Paths:
         with spaces.one() as space:
@@ -320,7 +321,7 @@ def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress |
 
 def _at_once(plan: Plan, threads: int | None, chunk: int, progress: Progress | None) -> Paths:
     """All rays in one table from the start: where no ray splits, each has its row."""
-    spaces = _Workspaces(min(chunk, plan.total))
+    spaces = _Workspaces(plan, chunk)
     ends = blank(Ends, plan.total)
     uniform = isinstance(plan.source, Beam) and plan.source.profile is None
     launched = np.broadcast_to(np.complex128(1.0), (plan.total,))
