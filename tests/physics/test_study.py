@@ -44,7 +44,9 @@ def trace_michelson(data, beam):
     splitter = int(data["bs_index"])
     low, high = data["ccd"][1], data["ccd"][3]
     pitch = (high - low) / int(data["npix"])
-    ccd = ft.CCD((data["ccd"][0], 0.0, 0.5 * (low + high)), (-1, 0, 0), (0, 0, 1), pitch, (int(data["npix"]), 1))
+    ccd = ft.CCD(
+        (data["ccd"][0], 0.0, 0.5 * (low + high)), (-1, 0, 0), (0, 0, 1), pitch, (int(data["npix"]), 1)
+    )
     rays = ft.Rays(lift(data[f"{beam}_org"]), lift(data[f"{beam}_dir"]), passes=(f"segment {splitter}",))
     return ft.trace(ft.Scene(surfaces), rays, ccd, record=True)
 
