@@ -118,3 +118,31 @@ def test_a_surface_moves_with_its_form():
     paths = ft.trace(ft.Scene([moved]), ft.Rays([(5.3, 0.4, 9.0)], [(0, 0, -1)]))
     assert paths.length[0] == pytest.approx(9.0 - math.sqrt(4.0 - 0.25), rel=1e-14)
     assert moved.name == "ball"
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: forms.Smooth(np.zeros((4, 3))), r"Smooth normals: expected directions of shape \(v, 3\)"),
+        (lambda: forms.Smooth(np.ones((4, 2))), r"Smooth normals: expected directions of shape \(v, 3\)"),
+        (
+            lambda: surface_of(forms.Smooth(np.ones((4, 3)))),
+            "Smooth normals: expected 162, one for each vertex, got 4",
+        ),
+        (lambda: surface_of(forms.Smooth(), shapes.corner_cube(1.0)), "of a sharp edge a surface of its own"),
+        (lambda: surface_of(forms.Smooth(), twice()), "Smooth form: expected faces wound alike"),
+    ],
+)
+def test_what_smooth_refuses(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def surface_of(form, mesh=None):
+    return ft.Surface(shapes.icosphere(2.0, 2) if mesh is None else mesh, ft.Mirror(), form=form)
+
+
+def twice():
+    """A plate of which each face is there twice."""
+    plate = shapes.plate(1.0, 1.0)
+    return ft.Mesh(plate.vertices, np.concatenate([plate.faces, plate.faces]))

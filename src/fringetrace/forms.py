@@ -1,7 +1,7 @@
 """The exact surface behind the facets: the mesh finds a hit, the form decides where it is.
 
-A form is the set of points where a smooth function, its level, is 0. Each fits itself to a mesh;
-the fit moves hits along their rays onto the form and tells the true normal there.
+Each form fits itself to a mesh; the fit moves hits along their rays onto the form and tells the
+true normal there.
 """
 
 from __future__ import annotations
@@ -13,69 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.crossings import Fit, component, dot, fit_level
+from fringetrace.patches import patched, vertex_normals
 from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, unit
-from fringetrace.waves import Array, FloatArray
-
-EPSILON = float(np.finfo(np.float64).eps)
-# Vertices this part of the mesh's size off the form are not meant to lie on it.
-NEAR = 0.05
-# Faces whose normal is more than 60 degrees from the form's are not meant for it: end caps of a rod.
-ALONG = 0.5
-# Steps along the ray. One is exact on a quadric, the others polish; elsewhere each cubes the error.
-STEPS = 12
-# A hit is on the form if it is within this many roundings of the coordinates.
-ROUNDINGS = 256.0
-
-
-@dataclass(frozen=True, eq=False)
-class Meeting:
-    """Where rays meet a form, one row each; NaN where they do not.
-
-    `path` (n,) and `point` (n, 3) in metres, `normal` (n, 3) along the gradient, `face` (n,).
-    """
-
-    path: FloatArray
-    point: FloatArray
-    normal: FloatArray
-    face: npt.NDArray[np.int64]
-
-
-class Fit(Protocol):
-    """A form that knows its mesh.
-
-    `along` (f,) tells for each face whether its front is on the side that the gradient points to (1)
-    or not (-1); 0: the face is not part of the form. `sag` is the largest distance in metres of the
-    faces from the form. `complete`: `meet` finds its way to the form from any point of a ray.
-    """
-
-    @property
-    def along(self) -> npt.NDArray[np.int8]: ...  # noqa: D102
-
-    @property
-    def sag(self) -> float: ...  # noqa: D102
-
-    @property
-    def complete(self) -> bool: ...  # noqa: D102
-
-    def meet(
-        self, origin: FloatArray, direction: FloatArray, path: FloatArray, side: FloatArray, face: Array
-    ) -> Meeting:
-        """Move hits onto the form, along their rays.
-
-        Parameters
-        ----------
-        origin, direction : (n, 3) float64, metres, unit
-        path : (n,) float64, metres
-            A guess, such as that of the hit on a face.
-        side : (n,) float64
-            1 for the crossing where the ray goes along the gradient, -1 for the one against it.
-        face : (n,) int64
-            The faces met; -1 where not known.
-
-        Returns
-        -------
-        Meeting
-        """
+from fringetrace.waves import FloatArray
 
 
 class Form(Protocol):
@@ -86,94 +27,6 @@ class Form(Protocol):
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
         """The form turned about the origin, then shifted; as `Mesh.moved`."""
-
-
-class Level(Protocol):
-    """A form given by a function of the point."""
-
-    def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The function (n,), its gradient (n, 3), and its second derivative along the directions (n,)."""
-
-
-def _dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    return np.asarray(np.einsum("ij,ij->i", a, b), dtype=np.float64)
-
-
-def _along(a: FloatArray, axis: FloatArray) -> FloatArray:
-    # not a matrix product: its last bits depend on how many rows there are
-    return np.asarray(np.einsum("ij,j->i", a, axis), dtype=np.float64)
-
-
-def _advance(value: FloatArray, slope: FloatArray, bend: FloatArray, side: FloatArray) -> FloatArray:
-    """Way to the root of value + slope s + bend s^2 / 2 at which the slope has the sign of `side`.
-
-    Where there is none: to the extremum.
-    """
-    root = side * np.sqrt(np.maximum(slope * slope - 2.0 * value * bend, 0.0))
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        near = np.where(value == 0.0, 0.0, -2.0 * value / (slope + root))
-        return np.where(side * slope >= 0.0, near, (root - slope) / bend)
-
-
-@dataclass(frozen=True, eq=False)
-class LevelFit:
-    """A level function fitted to a mesh; fields as in `Fit`, and the size of the mesh in metres."""
-
-    form: Level
-    along: npt.NDArray[np.int8]
-    sag: float
-    complete: bool
-    size: float
-
-    def meet(
-        self, origin: FloatArray, direction: FloatArray, path: FloatArray, side: FloatArray, face: Array
-    ) -> Meeting:
-        """Move hits onto the form; see `Fit.meet`."""
-        path = path.copy()
-        rows = np.arange(len(path))
-        with np.errstate(all="ignore"):
-            for _ in range(STEPS):
-                along = direction[rows]
-                value, gradient, bend = self.form.level(origin[rows] + path[rows, None] * along, along)
-                step = _advance(value, _dot(gradient, along), bend, side[rows])
-                path[rows] += step
-                # each ray for itself: what others do must not matter
-                rows = rows[np.abs(step) > 4.0 * EPSILON * np.abs(path[rows])]
-                if len(rows) == 0:
-                    break
-            point = origin + path[:, None] * direction
-            value, gradient, _ = self.form.level(point, direction)
-            square = _dot(gradient, gradient)
-            rounding = ROUNDINGS * EPSILON * (np.abs(point).max(axis=1) + self.size)
-            missed = ~(np.abs(value) <= rounding * np.sqrt(square))
-            path[missed] = np.nan
-            point = point - (value / square)[:, None] * gradient
-            return Meeting(path, point, gradient / np.sqrt(square)[:, None], np.asarray(face))
-
-
-def _level_fit(form: Level, vertices: FloatArray, faces: npt.NDArray[np.int64], complete: bool) -> LevelFit:
-    corners = vertices[faces]
-    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normal = unit(normal)
-    samples = [corners[:, 0], corners[:, 1], corners[:, 2], corners.mean(axis=1)]
-    samples += [0.5 * (corners[:, k] + corners[:, k - 1]) for k in range(3)]
-    off, cosine = [], np.zeros(len(faces))
-    with np.errstate(all="ignore"):
-        for k, sample in enumerate(samples):
-            value, gradient, _ = form.level(sample, normal)
-            steep = np.sqrt(_dot(gradient, gradient))
-            off.append(np.abs(value) / steep)
-            if k == 3:
-                cosine = _dot(normal, gradient) / steep
-        on = (np.max(off[:3], axis=0) <= NEAR * size) & (np.abs(cosine) >= ALONG)
-    along = np.where(on, np.sign(cosine), 0.0).astype(np.int8)
-    if not along.any():
-        raise ValueError(
-            f"{type(form).__name__} form: expected faces that lie along it within {NEAR:g} of the mesh's "
-            f"size, got none among {len(faces)}"
-        )
-    return LevelFit(form, along, float(np.max(np.stack(off)[:, along != 0])), complete, size)
 
 
 def _positive(value: float, what: str) -> float:
@@ -211,12 +64,12 @@ class Sphere:
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(rho^2 - r^2) / 2r, the distance from the surface near it; see `Level`."""
         spoke = (point - self.centre) / self.radius
-        value = 0.5 * self.radius * (_dot(spoke, spoke) - 1.0)
+        value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
         return value, spoke, np.full(len(point), 1.0 / self.radius)
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
         """The sphere on a mesh; see `Form`."""
-        return _level_fit(self, vertices, faces, complete=True)
+        return fit_level(self, vertices, faces, complete=True)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Sphere:
         """The sphere turned about the origin, then shifted; as `Mesh.moved`."""
@@ -252,13 +105,13 @@ class Cylinder:
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """(rho^2 - r^2) / 2r, the distance from the surface near it; see `Level`."""
         offset = point - self.point
-        spoke = (offset - np.outer(_along(offset, self.axis), self.axis)) / self.radius
-        value = 0.5 * self.radius * (_dot(spoke, spoke) - 1.0)
-        return value, spoke, (1.0 - _along(direction, self.axis) ** 2) / self.radius
+        spoke = (offset - np.outer(component(offset, self.axis), self.axis)) / self.radius
+        value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
+        return value, spoke, (1.0 - component(direction, self.axis) ** 2) / self.radius
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
         """The cylinder on a mesh; see `Form`."""
-        return _level_fit(self, vertices, faces, complete=True)
+        return fit_level(self, vertices, faces, complete=True)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Cylinder:
         """The cylinder turned about the origin, then shifted; as `Mesh.moved`."""
@@ -312,14 +165,14 @@ class Conic:
         """Height above the surface; z - (c r^2 + c (1 + k) z^2) / 2 without terms. See `Level`."""
         c, k = 1.0 / self.radius, self.conic
         offset = point - self.vertex
-        z, dz = _along(offset, self.axis), _along(direction, self.axis)
+        z, dz = component(offset, self.axis), component(direction, self.axis)
         across = offset - np.outer(z, self.axis)
         aside = direction - np.outer(dz, self.axis)
-        square = _dot(across, across)
+        square = dot(across, across)
         if not self.terms:
             value = z - 0.5 * c * (square + (1.0 + k) * z * z)
             gradient = np.outer(1.0 - (1.0 + k) * c * z, self.axis) - c * across
-            return value, gradient, -c * (_dot(aside, aside) + (1.0 + k) * dz * dz)
+            return value, gradient, -c * (dot(aside, aside) + (1.0 + k) * dz * dz)
         root = np.sqrt(1.0 - (1.0 + k) * c * c * square)
         sag, first, second = c * square / (1.0 + root), 0.5 * c / root, 0.25 * (1.0 + k) * c**3 / root**3
         for i, a in enumerate(self.terms):
@@ -327,12 +180,12 @@ class Conic:
             sag = sag + a * square**power
             first = first + a * power * square ** (power - 1)
             second = second + a * power * (power - 1) * square ** (power - 2)
-        bend = -2.0 * first * _dot(aside, aside) - 4.0 * second * _dot(across, aside) ** 2
+        bend = -2.0 * first * dot(aside, aside) - 4.0 * second * dot(across, aside) ** 2
         return z - sag, self.axis - 2.0 * first[:, None] * across, bend
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
         """The conic on a mesh; see `Form`."""
-        return _level_fit(self, vertices, faces, complete=not self.terms)
+        return fit_level(self, vertices, faces, complete=not self.terms)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Conic:
         """The conic turned about the origin, then shifted; as `Mesh.moved`."""
@@ -392,8 +245,8 @@ class HeightField:
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Height above the spline; see `Level`."""
         turn = np.asarray(self.turn)
-        x, y, z = (_along(point - self.offset, axis) for axis in turn.T)
-        dx, dy = (_along(direction, axis) for axis in turn.T[:2])
+        x, y, z = (component(point - self.offset, axis) for axis in turn.T)
+        dx, dy = (component(direction, axis) for axis in turn.T[:2])
         x, y = np.nan_to_num(x), np.nan_to_num(y)
         height = {
             (i, j): self.spline.ev(y, x, dx=j, dy=i) for i in range(3) for j in range(3) if i + j <= 2
@@ -404,7 +257,7 @@ class HeightField:
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
         """The spline on a mesh; see `Form`."""
-        return _level_fit(self, vertices, faces, complete=False)
+        return fit_level(self, vertices, faces, complete=False)
 
     def moved(
         self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None
@@ -414,3 +267,54 @@ class HeightField:
         own = np.asarray(self.turn)
         both = own if turn is None else checked_rotation(turn, "turn") @ own
         return HeightField(self.heights, self.pitch, place, both)
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A curved patch over each face, from the normals at the vertices: for a mesh of a smooth part.
+
+    Hits are off the part that was meant by the fourth power of the length of the facets' sides where
+    the normals are right, the third at worst; facets themselves, by the second.
+
+    Parameters
+    ----------
+    normals : (v, 3), optional
+        Normals at the vertices, to the front; None: from the faces around each vertex.
+
+    Raises
+    ------
+    ValueError
+        If normals are not rows of three finite numbers; at a `Surface`, if there is not one for each
+        vertex, faces are not wound alike, or the mesh has sharp edges.
+    """
+
+    normals: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.normals is None:
+            return
+        normals = np.array(self.normals, dtype=np.float64)
+        if (
+            normals.ndim != 2
+            or normals.shape[1] != 3
+            or not (np.isfinite(normals).all() and normals.any(1).all())
+        ):
+            raise ValueError(
+                f"Smooth normals: expected directions of shape (v, 3), got shape {normals.shape}"
+            )
+        object.__setattr__(self, "normals", unit(normals))
+
+    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+        """Patches over a mesh; see `Form`."""
+        normals = vertex_normals(vertices, faces) if self.normals is None else self.normals
+        if len(normals) != len(vertices):
+            raise ValueError(
+                f"Smooth normals: expected {len(vertices)}, one for each vertex, got {len(normals)}"
+            )
+        return patched(vertices, faces, normals)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
+        """The normals turned; as `Mesh.moved`."""
+        if self.normals is None or turn is None:
+            return self
+        return Smooth(np.asarray(self.normals @ checked_rotation(turn, "turn").T))
