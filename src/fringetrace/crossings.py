@@ -125,7 +125,7 @@ class LevelFit:
                 step = advance(value, dot(gradient, along), bend, side[rows])
                 path[rows] += step
                 # each ray for itself: what others do must not matter
-                rows = rows[np.abs(step) > 4.0 * EPSILON * np.abs(path[rows])]
+                rows = rows[np.abs(step) > 4.0 * EPSILON * (np.abs(path[rows]) + self.size)]
                 if len(rows) == 0:
                     break
             point = origin + path[:, None] * direction

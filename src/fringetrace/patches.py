@@ -23,7 +23,7 @@ OUTSIDE = 1e-12
 # A ray slides over so many patches in search of the one that it meets.
 WALKS = 16
 # Newton steps from a point to the foot of its height on a patch.
-FEET = 8
+FEET = 4
 
 
 def vertex_normals(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> FloatArray:
@@ -76,26 +76,8 @@ def _handle(start: FloatArray, end: FloatArray, normal: FloatArray) -> FloatArra
     return np.asarray(start + across * (2.0 / (3.0 * cosine * (1.0 + cosine))), dtype=np.float64)
 
 
-# Powers of the three barycentric coordinates in a cubic, and how often each stands.
-POWERS = np.array(
-    [
-        (3, 0, 0),
-        (0, 3, 0),
-        (0, 0, 3),
-        (2, 1, 0),
-        (1, 2, 0),
-        (0, 2, 1),
-        (0, 1, 2),
-        (1, 0, 2),
-        (2, 0, 1),
-        (1, 1, 1),
-    ]
-)
-TIMES = np.array([1.0, 1.0, 1.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 6.0])
-
-
 def _control(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatArray) -> FloatArray:
-    """Control points (f, 10, 3) in the order of `POWERS`."""
+    """Control points (f, 10, 3): corners, two on each of the sides 01, 12, 20, one in the middle."""
     corner, up = [vertices[faces[:, k]] for k in range(3)], [normals[faces[:, k]] for k in range(3)]
     points = list(corner)
     for k in range(3):
@@ -105,36 +87,59 @@ def _control(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatA
     return np.stack([*points, middle + 0.5 * (middle - flat)], axis=1)
 
 
-def _weights(u: FloatArray, v: FloatArray, along_u: int, along_v: int) -> FloatArray:
-    """Weights (n, 10) of the control points, differentiated so many times along u and v (w = 1 - u - v)."""
-    w = 1.0 - u - v
-    terms = [(TIMES, POWERS)]
-    for axis in [0] * along_u + [1] * along_v:
-        # d/du = d/da - d/dc
-        new = []
-        for factor, power in terms:
-            for which, sign in ((axis, 1.0), (2, -1.0)):
-                lower = power.copy()
-                lower[:, which] -= 1
-                new.append((sign * factor * power[:, which], np.maximum(lower, 0)))
-        terms = new
-    powers = [np.stack([np.ones_like(x), x, x * x, x * x * x], axis=1) for x in (u, v, w)]
-    total = np.zeros((len(u), 10))
-    for factor, power in terms:
-        total += factor * powers[0][:, power[:, 0]] * powers[1][:, power[:, 1]] * powers[2][:, power[:, 2]]
-    return total
+def _powers(control: FloatArray) -> FloatArray:
+    """Coefficients (f, 10, 3) of 1, u, v, u^2, uv, v^2, u^3, u^2 v, u v^2, v^3; u is 1 at corner 0."""
+    a, b, c = (control[:, k] for k in range(3))
+    ab, ba, bc, cb, ca, ac = (3.0 * control[:, k] for k in range(3, 9))
+    middle = 6.0 * control[:, 9]
+    one_u, one_v = ca - 3.0 * c, cb - 3.0 * c
+    two_u, two_v = 3.0 * c - 2.0 * ca + ac, 3.0 * c - 2.0 * cb + bc
+    both = 6.0 * c - 2.0 * ca - 2.0 * cb + middle
+    three_u, three_v = a - c + ca - ac, b - c + cb - bc
+    mixed_u = ab - ac + 2.0 * ca - 3.0 * c + cb - middle
+    mixed_v = ba - bc + 2.0 * cb - 3.0 * c + ca - middle
+    return np.stack([c, one_u, one_v, two_u, both, two_v, three_u, mixed_u, mixed_v, three_v], axis=1)
+
+
+def _slopes(u: FloatArray, v: FloatArray) -> FloatArray:
+    """The powers of `_powers` and their derivatives along u and v, (n, 3, 10)."""
+    none, one = np.zeros_like(u), np.ones_like(u)
+    uu, uv, vv = u * u, u * v, v * v
+    return np.stack(
+        [
+            np.stack([one, u, v, uu, uv, vv, uu * u, uu * v, u * vv, vv * v], axis=1),
+            np.stack([none, one, none, 2.0 * u, v, none, 3.0 * uu, 2.0 * uv, vv, none], axis=1),
+            np.stack([none, none, one, none, u, 2.0 * v, none, uu, 2.0 * uv, 3.0 * vv], axis=1),
+        ],
+        axis=1,
+    )
+
+
+def _bends(u: FloatArray, v: FloatArray, p: FloatArray, q: FloatArray) -> FloatArray:
+    """Second derivative (n, 10) of the powers along (p, q)."""
+    none, one = np.zeros_like(u), np.ones_like(u)
+    pp, pq, qq = p * p, 2.0 * p * q, q * q
+    uu, uv, vv = (
+        np.stack(column, axis=1)
+        for column in (
+            [none, none, none, 2.0 * one, none, none, 6.0 * u, 2.0 * v, none, none],
+            [none, none, none, none, one, none, none, 2.0 * u, 2.0 * v, none],
+            [none, none, none, none, none, 2.0 * one, none, none, 2.0 * u, 6.0 * v],
+        )
+    )
+    return np.asarray(pp[:, None] * uu + pq[:, None] * uv + qq[:, None] * vv)
 
 
 @dataclass(frozen=True, eq=False)
 class Patches:
     """Curved patches of a mesh; a `forms.Fit`.
 
-    `control` (f, 10, 3) metres from the centre of each face, `frame` (f, 3, 3) rows: two axes in the
-    face's plane, its normal; `flat` (f, 3, 2): from places in that plane to parameters.
+    `frame` (f, 3, 3) rows: two axes in the face's plane, its normal; `powers` (f, 10, 3) metres: the
+    patch in that frame, from the centre of the face; `flat` (f, 2, 3): from places to parameters.
     """
 
     centre: FloatArray
-    control: FloatArray
+    powers: FloatArray
     frame: FloatArray
     flat: FloatArray
     beside: npt.NDArray[np.int64]
@@ -143,35 +148,24 @@ class Patches:
     size: float
     complete: bool = False
 
-    def _surface(self, face: Array, u: FloatArray, v: FloatArray, along_u: int, along_v: int) -> FloatArray:
-        weights = _weights(u, v, along_u, along_v)
-        return np.asarray(np.einsum("ni,nij->nj", weights, self.control[face]), dtype=np.float64)
-
     def level(
         self, point: FloatArray, direction: FloatArray, face: Array
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Height over a patch along its face's normal, and the parameters (n, 2) of its foot; cf. `Level`."""
-        frame = self.frame[face]
-        local = point - self.centre[face]
-        place = np.einsum("nij,nj->ni", frame[:, :2], local)
-        u, v = (
-            np.einsum("ni,ni->n", self.flat[face, k, :2], place) + self.flat[face, k, 2] for k in range(2)
-        )
-        for step in range(FEET + 1):
-            du, dv = self._surface(face, u, v, 1, 0), self._surface(face, u, v, 0, 1)
-            if step == FEET:
-                break
-            miss = place - np.einsum("nij,nj->ni", frame[:, :2], self._surface(face, u, v, 0, 0))
-            u, v = (x + y for x, y in zip((u, v), _solved(frame, du, dv, miss), strict=True))
-        normal = unit(np.cross(du, dv))
-        upright = dot(normal, frame[:, 2])
-        value = dot(frame[:, 2], local - self._surface(face, u, v, 0, 0))
-        p, q = _solved(frame, du, dv, np.einsum("nij,nj->ni", frame[:, :2], direction))
-        second = (p * p)[:, None] * self._surface(face, u, v, 2, 0)
-        second += (2.0 * p * q)[:, None] * self._surface(face, u, v, 1, 1)
-        second += (q * q)[:, None] * self._surface(face, u, v, 0, 2)
-        bend = -dot(normal, second) / upright
-        return value, normal / upright[:, None], bend, np.stack([u, v], axis=1)
+        frame, powers, flat = self.frame[face], self.powers[face], self.flat[face]
+        local = np.einsum("nij,nj->ni", frame, point - self.centre[face])
+        along = np.einsum("nij,nj->ni", frame, direction)
+        u, v = (flat[:, k, 0] * local[:, 0] + flat[:, k, 1] * local[:, 1] + flat[:, k, 2] for k in range(2))
+        for _ in range(FEET):
+            place, du, dv = np.swapaxes(_slopes(u, v) @ powers, 0, 1)
+            p, q = _solved(du, dv, local - place)
+            u, v = u + p, v + q
+        place, du, dv = np.swapaxes(_slopes(u, v) @ powers, 0, 1)
+        normal = np.cross(du, dv)
+        normal /= normal[:, 2:]
+        second = np.einsum("ni,nij->nj", _bends(u, v, *_solved(du, dv, along)), powers)
+        gradient = np.einsum("nij,ni->nj", frame, normal)
+        return local[:, 2] - place[:, 2], gradient, -dot(normal, second), np.stack([u, v], axis=1)
 
     def _settled(
         self, origin: FloatArray, direction: FloatArray, path: FloatArray, side: FloatArray, face: Array
@@ -184,7 +178,7 @@ class Patches:
             )
             step = advance(value, dot(gradient, direction[rows]), bend, side[rows])
             path[rows] += step
-            rows = rows[np.abs(step) > 4.0 * EPSILON * np.abs(path[rows])]
+            rows = rows[np.abs(step) > 4.0 * EPSILON * (np.abs(path[rows]) + self.size)]
             if len(rows) == 0:
                 break
         return self.level(origin + path[:, None] * direction, direction, face)[3]
@@ -217,15 +211,11 @@ class Patches:
             return Meeting(path, point, gradient / steep[:, None], face)
 
 
-def _solved(
-    frame: FloatArray, du: FloatArray, dv: FloatArray, goal: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Steps p, q with p du + q dv above the place `goal` (n, 2) of the face's plane."""
-    a, b = np.einsum("nij,nj->ni", frame[:, :2], du), np.einsum("nij,nj->ni", frame[:, :2], dv)
-    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    p = (goal[:, 0] * b[:, 1] - goal[:, 1] * b[:, 0]) / area
-    q = (a[:, 0] * goal[:, 1] - a[:, 1] * goal[:, 0]) / area
-    return p, q
+def _solved(du: FloatArray, dv: FloatArray, goal: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Steps p, q with p du + q dv above the place `goal`, all in the frame of a face."""
+    area = du[:, 0] * dv[:, 1] - du[:, 1] * dv[:, 0]
+    p = (goal[:, 0] * dv[:, 1] - goal[:, 1] * dv[:, 0]) / area
+    return p, (du[:, 0] * goal[:, 1] - du[:, 1] * goal[:, 0]) / area
 
 
 def patched(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatArray) -> Patches:
@@ -268,4 +258,13 @@ def patched(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatAr
     # no patch is farther off than its control points
     sag = float(np.abs(np.einsum("nj,nkj->nk", upright, control)).max())
     along = np.ones(len(faces), dtype=np.int8)
-    return Patches(centre, control, frame, flat, neighbours(faces), along, sag, size)
+    return Patches(
+        centre,
+        _powers(np.einsum("nij,nkj->nki", frame, control)),
+        frame,
+        flat,
+        neighbours(faces),
+        along,
+        sag,
+        size,
+    )
