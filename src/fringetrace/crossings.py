@@ -161,6 +161,7 @@ def fit_level(form: Level, vertices: FloatArray, faces: npt.NDArray[np.int64], c
     corners = vertices[faces]
     size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    doubled = np.linalg.norm(normal, axis=1)
     normal = unit(normal)
     samples = [corners[:, 0], corners[:, 1], corners[:, 2], corners.mean(axis=1)]
     samples += [0.5 * (corners[:, k] + corners[:, k - 1]) for k in range(3)]
@@ -174,6 +175,7 @@ def fit_level(form: Level, vertices: FloatArray, faces: npt.NDArray[np.int64], c
                 cosine = dot(normal, gradient) / steep
         on = (np.max(off[:3], axis=0) <= NEAR * size) & (np.abs(cosine) >= ALONG)
     along = np.where(on, np.sign(cosine), 0.0).astype(np.int8)
+    along[along == -np.sign((doubled * along).sum())] = 0  # the other side of a lens, not of this form
     if not along.any():
         raise ValueError(
             f"{type(form).__name__} form: expected faces that lie along it within {NEAR:g} of the mesh's "

@@ -28,6 +28,10 @@ REACH = 2.0
 SIDES = 2.0
 # A ray crosses so many facets that lead nowhere before it is given up.
 CROSSINGS = 64
+# Where a bent form is not met from the nearest guess, guesses are this part of a side apart.
+APART = 0.25
+# Rays that leave more steeply (cosine to the normal) come out from behind the facets at once.
+FLAT = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,7 @@ class _Rays:
     """Some rays of a batch as a form sees them.
 
     `own` tells whether they have just left the form, `leaving` on which side of it: 1 where the
-    ray goes along the gradient, -1 against it.
+    ray goes along the gradient, -1 against it. `up` is the normal there, to the side that they went to.
     """
 
     origin: FloatArray
@@ -83,6 +87,11 @@ class _Rays:
     last: npt.NDArray[np.int64]
     own: npt.NDArray[np.bool_]
     leaving: FloatArray
+    up: FloatArray
+
+    def part(self, rows: Array) -> _Rays:
+        """Some of them."""
+        return _Rays(*(column[rows] for column in vars(self).values()))
 
 
 def _seen(form: Formed, batch: Batch, rows: Array) -> _Rays:
@@ -90,8 +99,9 @@ def _seen(form: Formed, batch: Batch, rows: Array) -> _Rays:
     last = batch.last[rows] - body.first
     own = (last >= 0) & (last < len(body.faces))
     along = np.where(own, form.fit.along[np.where(own, last, 0)], 0)
-    leaving = np.sign(np.einsum("ij,ij->i", state[:, 6:9], state[:, 3:6])) * along
-    return _Rays(state[:, :3], state[:, 3:6], np.where(own, last, -1), own & (along != 0), leaving)
+    facing = np.sign(np.einsum("ij,ij->i", state[:, 6:9], state[:, 3:6]))
+    up = facing[:, None] * state[:, 6:9]
+    return _Rays(state[:, :3], state[:, 3:6], np.where(own, last, -1), own & (along != 0), facing * along, up)
 
 
 def _first(form: Formed, start: FloatArray, direction: FloatArray, skip: Array, limit: Array) -> tuple[
@@ -118,28 +128,58 @@ def _false(form: Formed, rays: _Rays, crossed: FloatArray, side: FloatArray, met
     return ~((met.path > least) & (np.abs(met.path - crossed) <= SIDES * form.side))
 
 
+def _nearby(
+    form: Formed, rays: _Rays, path: FloatArray, side: FloatArray, face: Array, steps: range
+) -> Meeting:
+    """First hits of a form from several guesses along each ray: it may bend within a facet's length."""
+    best = _nothing(len(path))
+    for step in steps:
+        guess = path + step * APART * form.side
+        met = form.fit.meet(rays.origin, rays.direction, guess, side, face)
+        true = (met.path > 0.0) & (met.path < best.path) & (np.abs(met.path - guess) <= form.side)
+        _keep(best, np.flatnonzero(true), met, true)
+    return best
+
+
+def _nothing(count: int) -> Meeting:
+    return Meeting(np.full(count, np.inf), np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, -1))
+
+
+def _keep(best: Meeting, rows: Array, met: Meeting, chosen: Array) -> None:
+    for column, found in zip(vars(best).values(), vars(met).values(), strict=True):
+        column[rows] = found[chosen]
+
+
 def _through_facets(form: Formed, rays: _Rays, crossed: FloatArray, face: Array) -> Meeting:
     """Hits of the form that the facets lead to, the first of each ray, from the first facet crossed on."""
-    count = len(face)
-    best = Meeting(np.full(count, np.inf), np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, -1))
+    best = _nothing(len(face))
     rows = np.flatnonzero(face >= 0)
     crossed, face = crossed.copy(), face.copy()
+    entering = np.where(rays.own, -rays.leaving, 0.0)
     for _ in range(CROSSINGS):
-        some = _Rays(*(column[rows] for column in vars(rays).values()))
+        some = rays.part(rows)
         along = form.fit.along[face[rows]]
         facing = np.einsum("ij,ij->i", form.body.planes[face[rows], :3], some.direction)
         side = np.sign(facing) * np.where(along == 0, 1, along)
         met = form.fit.meet(some.origin, some.direction, crossed[rows], side, face[rows])
+        entering[rows] = np.where(entering[rows] == 0.0, side, entering[rows])
         false = _false(form, some, crossed[rows], side, met) & (along != 0)
+        again = np.flatnonzero(false & (side == entering[rows]))
+        if len(again) and not form.fit.complete:
+            few = some.part(again)
+            steps = range(-4, 9)
+            second = _nearby(form, few, crossed[rows[again]], side[again], face[rows[again]], steps)
+            found = np.isfinite(second.path)
+            _keep(met, again[found], second, found)
+            false[again[found]] = False
         flat = np.flatnonzero(along == 0)  # a face that is none of the form's counts as it is
         met.path[flat] = crossed[rows[flat]]
         met.point[flat] = some.origin[flat] + met.path[flat, None] * some.direction[flat]
         met.normal[flat] = form.body.planes[face[rows[flat]], :3]
         met.face[flat] = face[rows[flat]]
         true = ~false
-        for column, found in zip(vars(best).values(), vars(met).values(), strict=True):
-            column[rows[true]] = found[true]
-        rows, some = rows[false], _Rays(*(column[false] for column in vars(some).values()))
+        _keep(best, rows[true], met, true)
+        rows, some = rows[false], some.part(false)
         if len(rows) == 0:
             break
         start = some.origin + crossed[rows, None] * some.direction
@@ -172,8 +212,28 @@ def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
         there = (face >= 0) & (form.fit.along[face] != 0)
         kept, face = kept[there], face[there]
         met.face[kept] = face
-        for column, found in zip(vars(best).values(), vars(met).values(), strict=True):
-            column[rows[kept]] = found[kept]
+        _keep(best, rows[kept], met, kept)
+
+
+def _hidden(form: Formed, rays: _Rays, crossed: FloatArray, crossing: Array, best: Meeting) -> None:
+    """Hits of a bent form by rays that left it behind its facets and are long in coming out."""
+    flat = np.abs(np.einsum("ij,ij->i", rays.up, rays.direction)) < FLAT
+    rows = np.flatnonzero(rays.own & flat & (crossed > APART * form.side))
+    reach = REACH * form.fit.sag + START / form.body.frame[3]
+    above = rays.origin[rows] + reach * rays.up[rows]
+    limit = np.full(len(rows), reach)
+    _, face = _first(form, above, -rays.up[rows], np.full(len(rows), -1), limit)
+    outward = np.einsum("ij,ij->i", form.body.planes[crossing[rows], :3], rays.direction[rows])
+    emerging = (crossing[rows] >= 0) & (
+        np.sign(outward) * form.fit.along[crossing[rows]] == rays.leaving[rows]
+    )
+    rows = rows[(face >= 0) | emerging]
+    if len(rows) == 0:
+        return
+    few = rays.part(rows)
+    found = _nearby(form, few, np.zeros(len(rows)), -few.leaving, few.last, range(1, 17))
+    nearer = found.path < best.path[rows]
+    _keep(best, rows[nearer], found, nearer)
 
 
 def _refined(form: Formed, batch: Batch, rows: int, facets: Hits) -> tuple[Array, Meeting]:
@@ -185,9 +245,12 @@ def _refined(form: Formed, batch: Batch, rows: int, facets: Hits) -> tuple[Array
         own = (last >= 0) & (last < len(form.body.faces))
         chosen = np.flatnonzero(own | (facets.triangle[:rows] >= 0))
     rays = _seen(form, batch, chosen)
-    face = facets.triangle[chosen]
-    best = _through_facets(form, rays, facets.met[chosen, 0], np.where(face >= 0, face - form.body.first, -1))
+    face, crossed = facets.triangle[chosen], facets.met[chosen, 0]
+    face = np.where(face >= 0, face - form.body.first, -1)
+    best = _through_facets(form, rays, crossed, face)
     _between(form, rays, best)
+    if not form.fit.complete:
+        _hidden(form, rays, crossed, face, best)
     hit = np.isfinite(best.path)
     return chosen[hit], Meeting(*(column[hit] for column in vars(best).values()))
 

@@ -368,6 +368,39 @@ def test_ends_of_a_rod_stay_flat():
     assert paths.length == pytest.approx([3.0, 5.0 - math.sqrt(1 - 0.09)], rel=1e-15)
 
 
+def test_the_flat_back_of_a_lens_stays_flat():
+    # a cap of few facets and the fan behind it in one mesh: all vertices lie on the sphere
+    angle = np.arange(8) * 2 * math.pi / 8
+    rim = np.stack([0.3 * np.cos(angle), 0.3 * np.sin(angle), np.full(8, math.sqrt(1 - 0.09))], axis=1)
+    vertices = np.concatenate([rim, [(0.0, 0.0, 1.0)]])
+    cap = [(i, (i + 1) % 8, 8) for i in range(8)]
+    back = [(0, i + 1, i) for i in range(1, 7)]
+    surface = ft.Surface(ft.Mesh(vertices, cap + back), MIRROR, form=forms.Sphere((0, 0, 0), 1.0))
+    rays = ft.Rays([(0.1, 0.05, 2.0), (0.1, 0.05, 0.0)], [(0, 0, -1), (0, 0, 1)])
+    paths = ft.trace(ft.Scene([surface]), rays)
+    assert paths.length == pytest.approx([2.0 - math.sqrt(1 - 0.0125), math.sqrt(1 - 0.09)], rel=1e-15)
+
+
+@pytest.mark.parametrize("form", ["height field", "smooth"])
+def test_no_ray_falls_through_waves(form):
+    # 20 facets a wave, slopes up to 32 degrees
+    rng = np.random.default_rng(37)
+    cells, count = 80, 10_000
+    pitch = 2.0 / cells
+    x = (np.arange(cells + 1) - 0.5 * cells) * pitch
+    heights = 0.05 * np.sin(4 * math.pi * x)[None, :] * np.cos(4 * math.pi * x)[:, None]
+    exact = forms.HeightField(heights, pitch) if form == "height field" else forms.Smooth()
+    scene = ft.Scene([ft.Surface(shapes.height_map(heights, pitch), MIRROR, form=exact)])
+    start = np.concatenate([rng.uniform(-0.6, 0.6, (count, 2)), np.full((count, 1), 0.2)], axis=1)
+    steep = np.stack([*rng.normal(0, 0.5, (2, count)), -np.ones(count)], axis=1)
+    paths = ft.trace(scene, ft.Rays(start, steep), max_bounces=60)
+    down = paths.direction[:, 2] < 0.0
+    with np.errstate(divide="ignore"):
+        reach = (-0.1 - paths.origin[:, 2]) / paths.direction[:, 2]
+    landing = paths.origin + reach[:, None] * paths.direction
+    assert not (down & (np.abs(landing[:, :2]).max(axis=1) < 0.97)).any()
+
+
 def test_results_with_forms_do_not_depend_on_threads_or_chunks():
     rng = np.random.default_rng(31)
     rays = ft.Rays(rng.uniform(-0.3, 0.3, (3000, 3)), directions(rng, 3000))
