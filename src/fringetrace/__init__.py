@@ -19,7 +19,7 @@ from fringetrace.trace import stream, trace
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
-    from fringetrace import instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
 
 __version__ = _version("fringetrace")
 
@@ -39,6 +39,7 @@ __all__ = [
     "Surface",
     "complex_field",
     "degree",
+    "forms",
     "instruments",
     "meshes",
     "mm",
@@ -53,7 +54,7 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
 
 
 def __getattr__(name: str) -> Any:

@@ -203,3 +203,18 @@ def decide(
                 nearest, best = path, tri
         first = False
     return nearest, best
+
+
+@jit
+def first_hits(start, direction, skip, limit, planes, corners, order, lower, upper, tolerance):
+    """First hit of each ray beyond its start, in float64 alone: path and triangle, -1 if none before `limit`.
+
+    `start` (n, 3), `limit` (n,) in the unit box; `skip` (n,) is a triangle to be passed over.
+    """
+    path, triangle = np.empty(len(start)), np.empty(len(start), np.int64)
+    for i in range(len(start)):
+        path[i], triangle[i] = decide(
+            start[i, 0], start[i, 1], start[i, 2], direction[i, 0], direction[i, 1], direction[i, 2], skip[i],
+            -1, limit[i], 2, 0.0, 0.0, 0.0, planes, corners, order, lower, upper, tolerance,
+        )  # fmt: skip
+    return path, triangle

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -94,7 +93,7 @@ def michelson(
     scene = Scene(
         (
             Surface(crossing.moved(turn=rotation(y, math.pi / 4.0)), splitter, "splitter"),
-            replace(surface, mesh=surface.mesh.moved(-arm * z)),
+            surface.moved(-arm * z),
             Surface(facing.moved((arm + piston) * x), mirror, "reference"),
         )
     )

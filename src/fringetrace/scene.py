@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.forms import Form
 from fringetrace.interfaces import Interface
 from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, frame
 from fringetrace.waves import Array, FloatArray
@@ -219,22 +220,47 @@ class Surface:
     interface : Interface
         `Mirror`, `Absorber`, `BeamSplitter`.
     name : str
+    form : Form, optional
+        The exact surface that the facets stand for, one of `fringetrace.forms`; None: the facets
+        are the surface.
 
     Raises
     ------
     TypeError
-        If `mesh` is no mesh or `interface` no interface.
+        If `mesh` is no mesh, `interface` no interface, `form` no form.
+    ValueError
+        If the mesh does not lie along the form.
     """
 
     mesh: Mesh
     interface: Interface
     name: str = "surface"
+    form: Form | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", as_mesh(self.mesh, self.name))
         branches = all(hasattr(self.interface, name) for name in ("reflection", "transmission"))
         if isinstance(self.interface, type) or not branches:
             raise TypeError(f"{self.name} interface: expected one such as Mirror(), got {self.interface!r}")
+        if self.form is not None:
+            if isinstance(self.form, type) or not hasattr(self.form, "fit"):
+                raise TypeError(f"{self.name} form: expected one such as forms.Sphere, got {self.form!r}")
+            self.form.fit(self.mesh.vertices, self.mesh.faces)  # refuses what is not meant for this mesh
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Surface:
+        """The surface, mesh and form, turned about the origin, then shifted; as `Mesh.moved`.
+
+        Parameters
+        ----------
+        offset : (3,) array-like, metres
+        turn : (3, 3) array-like, optional
+
+        Returns
+        -------
+        Surface
+        """
+        form = None if self.form is None else self.form.moved(offset, turn)
+        return Surface(self.mesh.moved(offset, turn), self.interface, self.name, form)
 
 
 @dataclass(frozen=True)

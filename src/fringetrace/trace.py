@@ -17,6 +17,8 @@ import numpy as np
 from fringetrace.engine import Engine, Hits, Limits, aim, build, find, follow
 from fringetrace.paths import Fate, Paths, join, screen
 from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
+from fringetrace.refine import Formed, formed
+from fringetrace.refine import find as find_exact
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
@@ -38,6 +40,7 @@ class Plan:
     source: Beam | Rays
     ccd: CCD | None
     engine: Engine
+    forms: tuple[Formed, ...]
     passed: frozenset[int]
     reflection: ComplexArray
     transmission: ComplexArray
@@ -79,6 +82,9 @@ def _plan(
     if not (isinstance(min_amplitude, Real) and np.isfinite(min_amplitude) and min_amplitude >= 0.0):
         raise ValueError(f"min_amplitude: expected a number of at least 0, got {min_amplitude!r}")
     passed = frozenset(scene.index(name) for name in source.passes)
+    engine = build(
+        scene, passed | {i for i, surface in enumerate(scene.surfaces) if surface.form is not None}
+    )
     interfaces = [surface.interface for surface in scene.surfaces]
     reflection = np.array([complex(interface.reflection) for interface in interfaces])
     transmission = np.array([complex(interface.transmission) for interface in interfaces])
@@ -86,7 +92,8 @@ def _plan(
         scene=scene,
         source=source,
         ccd=ccd,
-        engine=build(scene, passed),
+        engine=engine,
+        forms=formed(scene, engine),
         passed=passed,
         reflection=reflection,
         transmission=transmission,
@@ -173,7 +180,7 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
     count, ended, serials, segments, doubtful, bounces = len(rays), 0, len(rays), 0, 0, 1
     passed = plan.passed
     limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
-    simple = plan.plain and ordered and len(plan.engine.bodies) == 1
+    simple = plan.plain and ordered and len(plan.engine.bodies) == 1 and not plan.forms
     while count:
         if simple and segments:
             segments += count
@@ -187,7 +194,10 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
             space.ends = ends = grown(ends, 2 * (ended + 2 * count))
         state, hits = space.state, space.hits
         segments += count
-        doubtful += find(plan.engine, state, count, hits, passed)
+        if plan.forms:
+            doubtful += find_exact(plan.engine, plan.forms, state, count, hits, passed)
+        else:
+            doubtful += find(plan.engine, state, count, hits, passed)
         passed = frozenset()
         before: dict[str, Array] = {}
         if record is not None:
