@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 
-from fringetrace import sheets
+from fringetrace import regions, sheets
 from fringetrace.paths import Fate, Paths, join, pixels
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
 
@@ -50,8 +49,7 @@ def complex_field(
 
     period = checked_wavelength(wavelength)
     if method == "wavefront":
-        whole = _whole(paths, half_wave_loss)
-        return sheets.fields(whole, wavelength, carrier=True)[0]
+        return _wavefront(paths, wavelength, True, half_wave_loss)[0]
     if method != "rays":
         raise ValueError(f"method: expected 'rays' or 'wavefront', got {method!r}")
     total: ComplexArray | None = None
@@ -98,15 +96,17 @@ def irradiance(paths: Paths | Iterable[Paths], wavelength: float, half_wave_loss
     ValueError
         For a wavelength that is none, paths without a CCD or not of a beam, or no paths at all.
     """
-    return sheets.fields(_whole(paths, half_wave_loss), wavelength, carrier=False)[1]
+    return _wavefront(paths, wavelength, False, half_wave_loss)[1]
 
 
-def _whole(paths: Paths | Iterable[Paths], half_wave_loss: bool) -> Paths:
-    """All paths as one table, with or without the sign of each mirror."""
+def _wavefront(
+    paths: Paths | Iterable[Paths], wavelength: float, carrier: bool, half_wave_loss: bool
+) -> tuple[ComplexArray, FloatArray]:
+    """Mean field and irradiance: sheets off smooth surfaces, which have no triangles, or off facets."""
     parts = [paths] if isinstance(paths, Paths) else list(paths)
     if not parts:
         raise ValueError("wavefront: expected at least one Paths, got none")
     whole = join(parts)
-    if half_wave_loss:
-        return whole
-    return replace(whole, amplitude=whole.amplitude * (1.0 - 2.0 * (whole.reflections % 2)))
+    smooth = whole.points is not None and whole.triangle is None
+    fields = sheets.fields if smooth else regions.fields
+    return fields(whole, wavelength, carrier=carrier, half_wave_loss=half_wave_loss)

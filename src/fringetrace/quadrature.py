@@ -17,6 +17,16 @@ from fringetrace.waves import Array, ComplexArray, FloatArray
 LEAST, MOST = 2, 32
 # What the quadrature of a fringe may be off, relative to its amplitude.
 ERROR = 1e-6
+# Barycentric points and weights on a triangle, exact to degree 5 (Radon 1948).
+_A, _B = (6.0 - np.sqrt(15.0)) / 21.0, (6.0 + np.sqrt(15.0)) / 21.0
+TRIANGLE = np.array(
+    [(1 / 3, 1 / 3, 1 / 3, 9 / 40)]
+    + [
+        (*np.roll((1.0 - 2.0 * at, at, at), turn), weight)
+        for at, weight in ((_A, (155.0 - np.sqrt(15.0)) / 1200.0), (_B, (155.0 + np.sqrt(15.0)) / 1200.0))
+        for turn in range(3)
+    ]
+)
 # Samples worked on at a time: what fits into a core's cache a few times over.
 BAND = 1 << 18
 
@@ -61,7 +71,8 @@ def gauss_table() -> tuple[FloatArray, FloatArray]:
 class Samples:
     """Sample points of a band of pixel rows from row `top` on; positions in pixels.
 
-    Those of pixel i are first[i] to first[i + 1]; their weights add up to 1.
+    Those of pixel i are first[i] to first[i + 1]; their weights add up to 1. A point is on the same
+    side of every edge as its (where_x, where_y), which keeps a distance from them.
     """
 
     top: int
@@ -70,6 +81,8 @@ class Samples:
     x: FloatArray
     y: FloatArray
     weight: FloatArray
+    where_x: FloatArray
+    where_y: FloatArray
 
     def blank(self) -> ComplexArray:
         """No light yet, at each point."""
@@ -95,15 +108,59 @@ class Samples:
         return mean.reshape(-1, self.columns), irradiance.reshape(-1, self.columns)
 
 
-def gauss_samples(order: npt.NDArray[np.int64], top: int) -> Samples:
-    """Gauss points of a band of pixels.
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Segments that edges of sheets draw on the pixels.
+
+    Attributes
+    ----------
+    segments : (n, 4) float64, pixels
+        x, y of either end.
+    pixel : (m,) int64
+        Each pixel (row * columns + column) that one crosses, sorted.
+    begin : (m + 1,) int64
+        Where its segments begin among `lines`.
+    lines : (k,) int64
+        Numbers of segments.
+    """
+
+    segments: FloatArray
+    pixel: npt.NDArray[np.int64]
+    begin: npt.NDArray[np.int64]
+    lines: npt.NDArray[np.int64]
+
+
+def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
+    """Which segments cross which pixels.
+
+    Parameters
+    ----------
+    segments : (n, 4) float64, pixels
+        x, y of either end.
+    shape : (rows, columns)
+
+    Returns
+    -------
+    Edges
+    """
+    from fringetrace import raster
+
+    pairs = raster.crossed(np.ascontiguousarray(segments), *shape)
+    pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+    pixel, begin = np.unique(pairs[:, 0], return_index=True)
+    return Edges(segments, pixel, np.append(begin, len(pairs)).astype(np.int64), pairs[:, 1].copy())
+
+
+def samples(order: npt.NDArray[np.int64], top: int, cuts: Edges | None = None) -> Samples:
+    """Points of a band of pixels: Gauss points, or, where edges cross, points of the pieces.
 
     Parameters
     ----------
     order : (rows, columns) int64
-        Points along either axis of each pixel.
+        Gauss points along either axis of each pixel.
     top : int
         The band's first row.
+    cuts : Edges, optional
 
     Returns
     -------
@@ -112,10 +169,30 @@ def gauss_samples(order: npt.NDArray[np.int64], top: int) -> Samples:
     from fringetrace import raster
 
     columns = order.shape[1]
-    first = np.concatenate([[0], np.cumsum(order.ravel() ** 2)]).astype(np.int64)
+    order = order.ravel()
+    count = order**2
+    pieces, cut = np.empty((0, 5)), np.empty(0, dtype=np.int64)
+    if cuts is not None:
+        mine = slice(*np.searchsorted(cuts.pixel, [top * columns, top * columns + len(order)]))
+        cut = cuts.pixel[mine] - top * columns
+        # the triangles' points do for a quarter of a cycle: squares enough for the fringes of so many points
+        parts = np.maximum(1, (3 * (order[cut] - 3) + 1) // 2)
+        begin = cuts.begin[mine.start : mine.stop + 1]
+        pieces, count[cut] = raster.cut(
+            cuts.pixel[mine], parts, begin, cuts.lines, cuts.segments, columns, TRIANGLE
+        )
+        order = order.copy()
+        order[cut] = 0
+    first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     x, y, weight = (np.empty(first[-1]) for _ in range(3))
-    raster.lattice(order.ravel(), columns, top, *gauss_table(), first, x, y, weight)
-    return Samples(top, columns, first, x, y, weight)
+    raster.lattice(order, columns, top, *gauss_table(), first, x, y, weight)
+    # rows of the cut pixels, in their order
+    into = np.repeat(first[cut], count[cut]) + np.arange(len(pieces))
+    into -= np.repeat(np.cumsum(count[cut]) - count[cut], count[cut])
+    x[into], y[into], weight[into] = pieces[:, 0], pieces[:, 1], pieces[:, 2]
+    where_x, where_y = x.copy(), y.copy()
+    where_x[into], where_y[into] = pieces[:, 3], pieces[:, 4]
+    return Samples(top, columns, first, x, y, weight, where_x, where_y)
 
 
 def bands(order: Array) -> list[tuple[int, int]]:
@@ -160,7 +237,7 @@ def fringes(slope: FloatArray, carrier: bool) -> FloatArray:
 
 
 def averaged(
-    order: npt.NDArray[np.int64], light: Callable[[Samples], ComplexArray]
+    order: npt.NDArray[np.int64], light: Callable[[Samples], ComplexArray], cuts: Edges | None = None
 ) -> tuple[ComplexArray, FloatArray]:
     """Means over the pixels of a field, band by band on all cores.
 
@@ -170,6 +247,8 @@ def averaged(
         Gauss points along either axis of each pixel.
     light : callable
         The field at the points of a band.
+    cuts : Edges, optional
+        Edges of sheets.
 
     Returns
     -------
@@ -179,8 +258,8 @@ def averaged(
     """
 
     def means(band: tuple[int, int]) -> tuple[ComplexArray, FloatArray]:
-        samples = gauss_samples(order[slice(*band)], band[0])
-        return samples.means(light(samples))
+        points = samples(order[slice(*band)], band[0], cuts)
+        return points.means(light(points))
 
     with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="fringetrace") as pool:
         means_, irradiances = zip(*pool.map(means, bands(order)), strict=True)

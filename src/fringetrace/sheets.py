@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.paths import Fate, Paths
-from fringetrace.quadrature import Samples, averaged, fringes, gauss_order, gauss_samples
+from fringetrace.quadrature import Samples, averaged, fringes, gauss_order, samples
 from fringetrace.scene import CCD, Beam
 from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray, checked_wavelength
@@ -28,6 +28,8 @@ STENCILS = (
     (0, (-1.0, 1.0)),
     (-1, (-1.0, 1.0)),
 )
+# Light that meets the CCD's plane flatter than this (cosine) went along it, but for rounding.
+FLATTEST = 1e-9
 # From values and slopes at both ends to the coefficients of a cubic.
 HERMITE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
 
@@ -123,7 +125,7 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
     facing = paths.direction @ n
     with np.errstate(divide="ignore", invalid="ignore"):
         reach = ((ccd.centre - paths.origin) @ n) / facing
-        beside = (paths.fate == Fate.LEFT) & (facing < 0.0) & (reach > 0.0)
+        beside = (paths.fate == Fate.LEFT) & (facing < -FLATTEST) & (reach > 0.0)
         reach = np.where(beside, reach + ccd.focus / facing, 0.0)
     rows = np.flatnonzero(beside | (paths.fate == Fate.DETECTED))
     point = paths.origin[rows] + reach[rows, None] * paths.direction[rows]
@@ -353,7 +355,9 @@ def _turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int
     return np.stack(branches, axis=-1)
 
 
-def fields(paths: Paths, wavelength: float, *, carrier: bool) -> tuple[ComplexArray, FloatArray]:
+def fields(
+    paths: Paths, wavelength: float, *, carrier: bool, half_wave_loss: bool = True
+) -> tuple[ComplexArray, FloatArray]:
     """Mean field and mean irradiance of each pixel, from sheets between the arrivals of a beam.
 
     Parameters
@@ -364,6 +368,8 @@ def fields(paths: Paths, wavelength: float, *, carrier: bool) -> tuple[ComplexAr
     carrier : bool
         Whether the mean field matters: then pixels are sampled for the whole slope of the phase;
         otherwise for the differences between the sheets that overlap.
+    half_wave_loss : bool
+        False leaves out the factor -1 of each reflection off a mirror.
 
     Returns
     -------
@@ -377,24 +383,26 @@ def fields(paths: Paths, wavelength: float, *, carrier: bool) -> tuple[ComplexAr
     """
     ccd, beam = checked(paths)
     period = checked_wavelength(wavelength)
+    if not half_wave_loss:
+        paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
     parts = [(cells(sheet, ccd), sheet.base) for sheet in sheets(paths)]
     unit = beam.area / ccd.pitch**2
 
-    def light(samples: Samples, slope: FloatArray) -> ComplexArray:
+    def light(points: Samples, slope: FloatArray) -> ComplexArray:
         from fringetrace import raster
 
-        total = samples.blank()
+        total = points.blank()
         for part, base in parts:
-            field = samples.blank()
+            field = points.blank()
             raster.spread(
-                part.leaves, part.coefficients, part.folded, part.turns, unit, period, samples.top,
-                samples.columns, samples.first, samples.x, samples.y, field, slope,
+                part.leaves, part.coefficients, part.folded, part.turns, unit, period, points.top,
+                points.columns, points.first, points.x, points.y, field, slope,
             )  # fmt: skip
             total += field * np.exp(2j * np.pi * np.fmod(base, period) / period)
         return total
 
     rows, columns = ccd.shape
     slope = np.tile([np.inf, -np.inf, np.inf, -np.inf], (rows * columns, 1))
-    light(gauss_samples(np.ones(ccd.shape, dtype=np.int64), 0), slope)
+    light(samples(np.ones(ccd.shape, dtype=np.int64), 0), slope)
     order = gauss_order(fringes(slope.reshape(rows, columns, 4), carrier) / period)
-    return averaged(order, lambda samples: light(samples, np.empty((0, 4))))
+    return averaged(order, lambda points: light(points, np.empty((0, 4))))

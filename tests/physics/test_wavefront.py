@@ -9,7 +9,8 @@ import pytest
 from scipy.special import hankel1
 
 import fringetrace as ft
-from fringetrace import mm, nm, um
+from fringetrace import instruments, mm, nm, regions, shapes, um
+from fringetrace.vectors import rotation
 
 HENE = 632.8 * nm
 # What a pixel's quadrature may be off.
@@ -176,3 +177,102 @@ def test_a_fold_ends_the_light():
         way = R * np.cos(x[cross]) + reach[cross]
         expected = -(passed / np.sqrt(abs(spread[cross])) * np.exp(2j * math.pi * way)).sum()
         assert found == pytest.approx(expected, rel=2e-4)
+
+
+# Flat facets: nothing is interpolated, edges are known to 1e-9 of a cell.
+
+
+def area(slope, at, corner=1.0):
+    """Part of each pixel below the line at + slope * y, 0 <= y <= 1, in pixels from its left side."""
+
+    def integral(u):
+        return np.where(u < 0, 0.0, np.where(u < 1, 0.5 * u * u, u - 0.5))
+
+    return (integral(at + slope) - integral(at)) / slope * corner
+
+
+@pytest.mark.parametrize("rise", [50 * nm, 79.1 * nm, 158.2 * nm])
+def test_pixels_on_a_slanted_step_see_both_its_sides(rise):
+    """cos^2(phase / 2) on either side, mixed by area where the edge crosses a pixel."""
+    turn, count, width = 0.3, 24, 6 * mm
+    mesh = shapes.step(4 * width, 4 * width, 0.4 * mm, rise).moved(turn=rotation((0, 0, 1), turn))
+    bench = instruments.michelson(mesh, aperture=width, pixels=(count, count))
+    coarse = replace(bench.beam, shape=(7, 9))
+    image = ft.irradiance(ft.trace(bench.scene, coarse, bench.ccd), HENE)
+    # the edge: x cos + y sin = .4 mm
+    pitch = width / count
+    slope = -math.tan(turn)
+    y = (np.arange(count) - 0.5 * count)[:, None]
+    at = 0.4 * mm / math.cos(turn) / pitch + slope * y - (np.arange(count) - 0.5 * count)
+    lower = area(slope, at)
+    upper = math.cos(2 * math.pi * rise / HENE) ** 2
+    assert image == pytest.approx(lower + (1 - lower) * upper, abs=1e-8)
+
+
+def test_tilt_fringes_on_a_step_are_averaged_up_to_its_edge():
+    """The mean of cos^2 over the part of a pixel on either side, in closed form."""
+    tilt, rise, edge, width, count = 4e-3, 50 * nm, 0.517 * mm, 3 * mm, 60
+    mesh = shapes.step(4 * width, 4 * width, edge, rise)
+    bench = instruments.michelson(mesh, aperture=width, pixels=(3, count), reference_tilt=(tilt, 0.0))
+    image = ft.irradiance(ft.trace(bench.scene, replace(bench.beam, shape=(5, 7)), bench.ccd), HENE)
+    # paths in the plane in focus: reference - sample = x sin 2a, and 2 rise more beyond the edge
+    k, slope = 2 * math.pi / HENE, math.sin(2 * tilt)
+    reference = 0.25 * math.cos(2 * tilt)
+    cross = 2 * 0.5 * math.sqrt(reference)
+
+    def integral(x, lift):
+        return (0.25 + reference) * x + cross * np.sin(k * (slope * x + 2 * lift)) / (k * slope)
+
+    sides = (np.arange(count + 1) / count - 0.5) * width
+    low, high = sides[:-1], sides[1:]
+    cut = np.clip(edge, low, high)
+    total = integral(cut, 0.0) - integral(low, 0.0) + integral(high, rise) - integral(cut, rise)
+    beyond = abs(0.5 * (low + high)) < 0.45 * width  # the tilted beam leaves one rim of the image dark
+    assert image[1][beyond] == pytest.approx((total / (width / count))[beyond], abs=3 * QUADRATURE)
+
+
+@pytest.mark.parametrize("angle", [1.5e-3, -1.5e-3])
+def test_two_mirrors_that_meet_overlap_or_leave_a_gap(angle):
+    """A valley z = |x| tan a: both waves within H tan 2a of the middle; a ridge: none there."""
+    height, count, pitch = 0.5, 64, 80 * um
+    slope = math.tan(angle)
+    mesh = shapes.extrude([(-9 * mm, 9 * mm * slope), (0, 0), (9 * mm, 9 * mm * slope)], 9 * mm)
+    beam = ft.Beam((0, 0, 0.4), (0, 0, -1), (0, 1, 0), (14 * mm, 3 * mm), (5, 10))
+    ccd = ft.CCD((0, 0, height), (0, 0, -1), (0, 1, 0), pitch, (2, count))
+    image = ft.irradiance(ft.trace(ft.Scene([ft.Surface(mesh, ft.Mirror())]), beam, ccd), HENE)
+    bright, rim = math.cos(2 * angle), height * math.tan(2 * angle)
+    sides = (np.arange(count + 1) - 0.5 * count) * pitch
+    k = 2 * math.pi * 2 * math.sin(2 * angle) / HENE
+    left = np.minimum(sides, rim)
+    right = np.maximum(sides, -rim)
+    inside = np.clip(sides, -abs(rim), abs(rim))
+    total = left + right
+    if angle > 0:
+        total = total + 2 * np.sin(k * inside) / k
+    assert image == pytest.approx(np.tile(bright * np.diff(total) / pitch, (2, 1)), abs=3 * QUADRATURE)
+
+
+def lit_width(region):
+    """Width of a region of a prism, in cells: its pieces are cut along the prism."""
+    s, size, a, b, c = region.pieces[:, [0, 2, 3, 4, 5]].T
+    assert (abs(b) <= 1e-3 * size).all()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        edge = np.clip(c / a, s, s + size)
+    width = np.where(a > 0, s + size - edge, np.where(a < 0, edge - s, size))
+    return (width * size).sum()
+
+
+def test_the_regions_of_a_lattice_are_as_wide_as_rays_count():
+    """Rods are prisms: of 200,000 rays across the beam, as many take a sequence as its region is wide."""
+    scene = ft.Scene([ft.Surface(shapes.rod_lattice(6, 3, 65 * nm, 280 * nm, 2 * um), ft.Mirror())])
+    count = 200_000
+    beam = ft.Beam((0.7 * um, 0, 2 * um), (0.1, 0, -1), (0, 1, 0), (1.2 * um, 0.5 * um), (1, 20_000))
+    ccd = ft.CCD((0.7 * um, 0, 1.8 * um), (0, 0, -1), (0, 1, 0), 0.2 * um, (4, 120))
+    paths = ft.trace(scene, beam, ccd, max_bounces=4)
+    found = list(regions.waves(paths))
+    fine = ft.trace(scene, replace(beam, shape=(1, count)), ccd, max_bounces=4).detected
+    width = sum(lit_width(region) for _, region in found) / (beam.shape[0] * beam.shape[1])
+    assert len(found) > 10
+    # each edge is a ray off at most, either way: their roots add
+    edges = 2 * len(found)
+    assert width == pytest.approx(len(fine) / count, abs=2 * math.sqrt(edges) / count)
