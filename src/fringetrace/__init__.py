@@ -10,7 +10,7 @@ from importlib import import_module
 from importlib.metadata import version as _version
 from typing import TYPE_CHECKING, Any
 
-from fringetrace.field import complex_field
+from fringetrace.field import complex_field, irradiance
 from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -41,6 +41,7 @@ __all__ = [
     "degree",
     "forms",
     "instruments",
+    "irradiance",
     "meshes",
     "mm",
     "nm",

@@ -6,8 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fringetrace.paths import Paths, screen
-from fringetrace.waves import ComplexArray, checked_wavelength
+from fringetrace import regions, sheets
+from fringetrace.paths import Paths, join, screen
+from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
 
 
 def complex_field(
@@ -24,10 +25,12 @@ def complex_field(
         From `trace`, or chunk by chunk from `stream`.
     wavelength : float, metres
         Vacuum wavelength. Another wavelength needs no new trace.
-    method : {"rays"}
+    method : {"rays", "wavefront"}
         "rays": the coherent sum E = sum of a exp(2 pi i OPL / wavelength) over the rays that fall
         in a pixel, each weighted with its beam area over the pixel's, so that a unit beam falling
         straight on the CCD gives |E|^2 = 1. Rays without an area have weight 1.
+        "wavefront": neighbouring rays of a `Beam` with the same path span a sheet, whose mean field
+        over each pixel is found; overlapping sheets add. See `irradiance`.
     half_wave_loss : bool
         False leaves out the factor -1 of each reflection off a mirror.
 
@@ -39,13 +42,16 @@ def complex_field(
     Raises
     ------
     ValueError
-        For a wavelength that is none, an unknown method, paths without a CCD, or no paths at all.
+        For a wavelength that is none, an unknown method, paths without a CCD, or no paths at all;
+        with "wavefront", for paths that are not of a beam.
     """
     from fringetrace import kernels
 
     period = checked_wavelength(wavelength)
+    if method == "wavefront":
+        return _wavefront(paths, wavelength, True, half_wave_loss)[0]
     if method != "rays":
-        raise ValueError(f"method: expected 'rays', got {method!r}")
+        raise ValueError(f"method: expected 'rays' or 'wavefront', got {method!r}")
     total: ComplexArray | None = None
     for part in (paths,) if isinstance(paths, Paths) else paths:
         if part.ccd is None:
@@ -60,3 +66,45 @@ def complex_field(
     if total is None:
         raise ValueError("complex_field: expected at least one Paths, got none")
     return total
+
+
+def irradiance(paths: Paths | Iterable[Paths], wavelength: float, half_wave_loss: bool = True) -> FloatArray:
+    """Irradiance averaged over each pixel of the CCD, from the sheets of a coherent beam.
+
+    Overlapping sheets add before the square is taken, at as many points of each pixel as their
+    fringes ask for: the mean of |E|^2, not the square of the mean field.
+
+    Parameters
+    ----------
+    paths : Paths, or an iterable of them
+        Of one `Beam`, from `trace`, or chunk by chunk from `stream`. Beams that are not coherent
+        with each other have irradiances that add.
+    wavelength : float, metres
+        Vacuum wavelength. Another wavelength needs no new trace.
+    half_wave_loss : bool
+        False leaves out the factor -1 of each reflection off a mirror.
+
+    Returns
+    -------
+    (rows, columns) float64
+        1 where a beam of unit irradiance falls straight on the CCD.
+
+    Raises
+    ------
+    ValueError
+        For a wavelength that is none, paths without a CCD or not of a beam, or no paths at all.
+    """
+    return _wavefront(paths, wavelength, False, half_wave_loss)[1]
+
+
+def _wavefront(
+    paths: Paths | Iterable[Paths], wavelength: float, carrier: bool, half_wave_loss: bool
+) -> tuple[ComplexArray, FloatArray]:
+    """Mean field and irradiance: sheets off smooth surfaces, which have no triangles, or off facets."""
+    parts = [paths] if isinstance(paths, Paths) else list(paths)
+    if not parts:
+        raise ValueError("wavefront: expected at least one Paths, got none")
+    whole = join(parts)
+    smooth = whole.points is not None and whole.triangle is None
+    fields = sheets.fields if smooth else regions.fields
+    return fields(whole, wavelength, carrier=carrier, half_wave_loss=half_wave_loss)

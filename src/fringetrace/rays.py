@@ -168,6 +168,35 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
     )
 
 
+def launch_at(beam: Beam, column: FloatArray, row: FloatArray) -> Rays:
+    """Rays of a beam from anywhere on its rectangle, all of amplitude 1.
+
+    Parameters
+    ----------
+    beam : Beam
+    column, row : (n,) float64
+        In cells of the beam's grid: (0, 0) is the rectangle's corner, ray [i, j] of the grid starts
+        at column j + 0.5, row i + 0.5.
+
+    Returns
+    -------
+    Rays
+    """
+    rows, columns = beam.shape
+    u, v, n = beam.axes
+    x = (column / columns - 0.5) * beam.size[0]
+    y = (row / rows - 0.5) * beam.size[1]
+    origin = beam.centre + (x[:, None] * u + y[:, None] * v)
+    return _trusted(
+        origin=origin,
+        direction=np.tile(n, (len(origin), 1)),
+        length=np.zeros(len(origin)),
+        amplitude=np.ones(len(origin), dtype=np.complex128),
+        area=beam.area,
+        passes=beam.passes,
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class Batch:
     """Rays under way, one row each, changed in place by the bounce passes. Lengths in metres.

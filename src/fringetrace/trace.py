@@ -277,6 +277,11 @@ def _pooled(
     work: Callable[[int, int], Result], total: int, threads: int | None, chunk: int, progress: Progress | None
 ) -> Iterator[Result]:
     """Work on chunks, some ahead of the reader on as many threads; the results in order."""
+    if total <= chunk:  # a thread takes longer to start than a few rays to trace
+        yield work(0, total)
+        if progress is not None:
+            progress(total, total)
+        return
     workers = (os.cpu_count() or 1) if threads is None else threads
     starts = iter(range(0, max(total, 1), chunk))
     with ThreadPoolExecutor(workers, thread_name_prefix="fringetrace") as pool:

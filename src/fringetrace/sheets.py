@@ -1,0 +1,408 @@
+"""Sheets of arrivals on smooth surfaces: a map from the beam to the CCD, interpolated to fourth order."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.paths import Fate, Paths
+from fringetrace.quadrature import Samples, averaged, fringes, gauss_order, samples
+from fringetrace.scene import CCD, Beam
+from fringetrace.vectors import frame
+from fringetrace.waves import Array, ComplexArray, FloatArray, checked_wavelength
+
+# Stencils for a first derivative: where they begin, and their weights (Lagrange; exact to the order
+# of their length less one). The longest that fits is taken, the most central first.
+STENCILS = (
+    (-2, (1 / 12, -8 / 12, 0.0, 8 / 12, -1 / 12)),
+    (-1, (-3 / 12, -10 / 12, 18 / 12, -6 / 12, 1 / 12)),
+    (-3, (-1 / 12, 6 / 12, -18 / 12, 10 / 12, 3 / 12)),
+    (0, (-25 / 12, 48 / 12, -36 / 12, 16 / 12, -3 / 12)),
+    (-4, (3 / 12, -16 / 12, 36 / 12, -48 / 12, 25 / 12)),
+    (-1, (-0.5, 0.0, 0.5)),
+    (0, (-1.5, 2.0, -0.5)),
+    (-2, (0.5, -2.0, 1.5)),
+    (0, (-1.0, 1.0)),
+    (-1, (-1.0, 1.0)),
+)
+# Light that meets the CCD's plane flatter than this (cosine) went along it, but for rounding.
+FLATTEST = 1e-9
+# From values and slopes at both ends to the coefficients of a cubic.
+HERMITE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
+
+
+@dataclass(frozen=True, eq=False)
+class Sheet:
+    """Arrivals of one path key on the beam's grid; NaN where there are none.
+
+    Attributes
+    ----------
+    x, y : (rows, columns) float64, pixels
+        Column and row coordinate in the CCD's plane of focus, inside the CCD or not.
+    slope_x, slope_y : (rows, columns) float64, metres a pixel
+        Gradient of the optical path there: the ray's direction.
+    length : (rows, columns) float64, metres
+        Optical path, less `base`.
+    base : float, metres
+    amplitude : (rows, columns) complex128
+    turns : (rows, columns) int64
+        Caustics passed (the KMAH index).
+    """
+
+    x: FloatArray
+    y: FloatArray
+    slope_x: FloatArray
+    slope_y: FloatArray
+    length: FloatArray
+    base: float
+    amplitude: ComplexArray
+    turns: npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """A sheet's cells as the kernels read them, see `raster`."""
+
+    coefficients: FloatArray
+    leaves: FloatArray
+    folded: npt.NDArray[np.bool_]
+    turns: npt.NDArray[np.int64]
+    base: float
+
+
+def differences(values: FloatArray, axis: int) -> FloatArray:
+    """Derivative along an axis of a grid, to fourth order where five neighbours are there.
+
+    Parameters
+    ----------
+    values : (rows, columns, ...) float64
+        NaN where there is none.
+    axis : {0, 1}
+
+    Returns
+    -------
+    float64, shape of `values`
+        A step of the grid is 1. NaN where a value or both of its neighbours are missing.
+    """
+    f = np.moveaxis(values, axis, 0)
+    result = np.full(f.shape, np.nan)
+    count = len(f)
+    for begin, weights in STENCILS:
+        if count < len(weights):
+            continue
+        # rows for which the whole stencil lies on the grid
+        low, high = -begin, count - (begin + len(weights) - 1)
+        if low >= high:
+            continue
+        estimate = sum(w * f[low + begin + i : high + begin + i] for i, w in enumerate(weights))
+        # 0 * NaN is NaN: a stencil with a hole in it gives none
+        open_ = np.isnan(result[low:high])
+        result[low:high] = np.where(open_, estimate, result[low:high])
+    return np.asarray(np.moveaxis(result, 0, axis), dtype=np.float64)
+
+
+def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
+    """Paths that cross the CCD's plane of focus, on the CCD or beside it.
+
+    Parameters
+    ----------
+    paths : Paths
+    ccd : CCD
+
+    Returns
+    -------
+    rows : (n,) int64
+        Which paths: those detected, and those that left the scene towards the CCD's front.
+    point : (n, 3) float64, metres
+        In the plane of focus.
+    length : (n,) float64, metres
+        Optical path to there.
+    """
+    _, _, n = frame(ccd.normal, ccd.up, "CCD")
+    facing = paths.direction @ n
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = ((ccd.centre - paths.origin) @ n) / facing
+        beside = (paths.fate == Fate.LEFT) & (facing < -FLATTEST) & (reach > 0.0)
+        reach = np.where(beside, reach + ccd.focus / facing, 0.0)
+    rows = np.flatnonzero(beside | (paths.fate == Fate.DETECTED))
+    point = paths.origin[rows] + reach[rows, None] * paths.direction[rows]
+    return rows, point, paths.length[rows] + reach[rows]
+
+
+def sheets(paths: Paths) -> Iterator[Sheet]:
+    """Arrivals of a beam, sorted by path key onto its grid.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of a `Beam`, onto a CCD. Where `points` were recorded, caustics are counted.
+
+    Yields
+    ------
+    Sheet
+        One for each key, in the order of the keys.
+
+    Raises
+    ------
+    ValueError
+        If the source is no beam, or there is no CCD.
+    """
+    ccd, beam = checked(paths)
+    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
+    rows, point, length = landed(paths, ccd)
+    keys = paths.key[rows]
+    for key in np.unique(keys):
+        mine = np.flatnonzero(keys == key)
+        chosen = rows[mine]
+
+        def grid(values: Array, chosen: Array = chosen) -> Array:
+            blank = np.full((beam.shape[0] * beam.shape[1], *values.shape[1:]), np.nan, dtype=values.dtype)
+            blank[paths.ray[chosen]] = values
+            return blank.reshape(*beam.shape, *values.shape[1:])
+
+        offset = point[mine] - ccd.centre
+        base = float(length[mine].mean())
+        direction = paths.direction[chosen]
+        turns = np.zeros(beam.shape, dtype=np.int64)
+        if paths.points is not None:
+            bounces = int(paths.bounces[chosen[0]])
+            way = np.concatenate([paths.points[chosen, : bounces + 1], point[mine, None]], axis=1)
+            last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
+            turns = caustics(grid(way), grid(direction), grid(last))
+        yield Sheet(
+            x=grid(offset @ u) / ccd.pitch + 0.5 * ccd.shape[1],
+            y=grid(offset @ v) / ccd.pitch + 0.5 * ccd.shape[0],
+            slope_x=grid(direction @ u) * ccd.pitch,
+            slope_y=grid(direction @ v) * ccd.pitch,
+            length=grid(length[mine] - base),
+            base=base,
+            amplitude=grid(paths.amplitude[chosen]),
+            turns=turns,
+        )
+
+
+def checked(paths: Paths) -> tuple[CCD, Beam]:
+    """The CCD and the beam of paths, once they are known to have both.
+
+    Parameters
+    ----------
+    paths : Paths
+
+    Returns
+    -------
+    CCD, Beam
+
+    Raises
+    ------
+    ValueError
+        If the source is no beam, or there is no CCD.
+    """
+    if paths.ccd is None:
+        raise ValueError("wavefront: expected paths traced onto a CCD, got paths without one")
+    if not isinstance(paths.source, Beam):
+        raise ValueError(f"wavefront: expected paths of a Beam, got those of {type(paths.source).__name__}")
+    return paths.ccd, paths.source
+
+
+def _across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Two unit vectors across each direction and each other."""
+    least = np.argmin(np.where(np.isnan(direction), 0.0, np.abs(direction)), axis=-1)
+    a = np.cross(direction, np.eye(3)[least])
+    a /= np.linalg.norm(a, axis=-1, keepdims=True)
+    return a, np.cross(direction, a)
+
+
+def caustics(way: FloatArray, arrival: FloatArray, last: FloatArray) -> npt.NDArray[np.int64]:
+    """Caustics that each ray of a sheet has passed (KMAH index): principal wavefront curvatures count.
+
+    Between two surfaces the ray tube has the cross-section det(Q0 + s Q1), where Q0 and Q1 are the
+    differentials of position and direction across the ray. Q1 Q0^-1 is the wavefront's curvature,
+    symmetric; each principal section 1 + curvature * s that changes its sign is a caustic.
+
+    Parameters
+    ----------
+    way : (rows, columns, k, 3) float64, metres
+        Points of the path from its start to the plane of focus.
+    arrival : (rows, columns, 3) float64, unit
+        Direction of the last segment.
+    last : (rows, columns) float64, metres
+        Its length; negative where the plane of focus lies behind the last surface: what the relay
+        images is the wave carried back, and caustics are taken back.
+
+    Returns
+    -------
+    (rows, columns) int64
+        0 where there is no path.
+    """
+    turns = np.zeros(last.shape, dtype=np.int64)
+    for leg in range(way.shape[2] - 1):
+        if leg < way.shape[2] - 2:
+            step = way[:, :, leg + 1] - way[:, :, leg]
+            reach = np.linalg.norm(step, axis=-1)
+            direction = step / reach[..., None]
+        else:
+            direction, reach = arrival, last
+        across = np.stack(_across(direction), axis=-2)
+        start, turned = (
+            np.einsum("...ij,...kj->...ik", across, np.stack([differences(f, 1), differences(f, 0)], axis=-2))
+            for f in (way[:, :, leg], direction)
+        )
+        known = np.isfinite(start).all(axis=(-1, -2)) & np.isfinite(turned).all(axis=(-1, -2))
+        start[~known], turned[~known] = np.eye(2), 0.0
+        curvature = turned @ np.linalg.inv(start)
+        principal = np.linalg.eigvalsh(0.5 * (curvature + np.swapaxes(curvature, -1, -2)))
+        reach = np.where(known, reach, 0.0)
+        passed = (1.0 + principal * reach[..., None] < 0.0).sum(axis=-1)
+        turns += np.where(reach < 0.0, -passed, passed)
+    return turns
+
+
+def _bicubic(f: FloatArray, along_s: FloatArray, along_t: FloatArray, twist: FloatArray) -> FloatArray:
+    """Coefficients (rows - 1, columns - 1, 4, 4) of s^i t^j from nodes and their derivatives."""
+
+    def corners(g: FloatArray) -> FloatArray:
+        return np.stack([np.stack([g[:-1, :-1], g[1:, :-1]], -1), np.stack([g[:-1, 1:], g[1:, 1:]], -1)], -2)
+
+    data = np.concatenate(
+        [
+            np.concatenate([corners(f), corners(along_t)], axis=-1),
+            np.concatenate([corners(along_s), corners(twist)], axis=-1),
+        ],
+        axis=-2,
+    )
+    return np.asarray(HERMITE @ data @ HERMITE.T, dtype=np.float64)
+
+
+def _interpolated(f: FloatArray) -> FloatArray:
+    """Bicubic of values alone."""
+    along_s = differences(f, 1)
+    return _bicubic(f, along_s, differences(f, 0), differences(along_s, 0))
+
+
+def cells(sheet: Sheet, ccd: CCD) -> Cells:
+    """Hermite patches between the nodes of a sheet, and their leaves.
+
+    The optical path has the exact gradient, dW = p . dx; positions have tangents by differences
+    of fourth order. At the rim of the beam's grid a cell reaches on to the rim of the beam, half a
+    cell beyond the rays.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    ccd : CCD
+
+    Returns
+    -------
+    Cells
+    """
+    from fringetrace import raster
+
+    x_s, x_t = differences(sheet.x, 1), differences(sheet.x, 0)
+    y_s, y_t = differences(sheet.y, 1), differences(sheet.y, 0)
+    w_s = sheet.slope_x * x_s + sheet.slope_y * y_s
+    w_t = sheet.slope_x * x_t + sheet.slope_y * y_t
+    area = x_s * y_t - x_t * y_s
+    fields = [
+        _bicubic(sheet.x, x_s, x_t, differences(x_s, 0)),
+        _bicubic(sheet.y, y_s, y_t, differences(y_s, 0)),
+        _bicubic(sheet.length, w_s, w_t, 0.5 * (differences(w_s, 0) + differences(w_t, 1))),
+        _interpolated(area),
+        _interpolated(sheet.amplitude.real),
+        _interpolated(sheet.amplitude.imag),
+    ]
+    coefficients = np.stack(fields, axis=2)
+    whole = np.isfinite(coefficients).all(axis=(2, 3, 4))
+    row, column = np.nonzero(whole)
+    rows, columns = whole.shape
+    domain = np.stack(
+        [
+            np.where(column == 0, -0.5, 0.0), np.where(column == columns - 1, 1.5, 1.0),
+            np.where(row == 0, -0.5, 0.0), np.where(row == rows - 1, 1.5, 1.0),
+        ], axis=1,
+    )  # fmt: skip
+    chosen = np.ascontiguousarray(coefficients[whole])
+    leaves = raster.split(chosen, domain, *ccd.shape)
+    folded = np.zeros(len(chosen), dtype=np.bool_)
+    signs = np.zeros((len(chosen), 2), dtype=np.bool_)
+    for branch, sign in enumerate((-1.0, 1.0)):
+        signs[leaves[leaves[:, raster.SIGN] == sign, raster.CELL].astype(np.int64), branch] = True
+    folded[leaves[leaves[:, raster.SIGN] == 0.0, raster.CELL].astype(np.int64)] = True
+    folded |= signs.all(axis=1)
+    return Cells(chosen, leaves, folded, _turns(sheet.turns, area)[whole], sheet.base)
+
+
+def _largest(grid: npt.NDArray[np.int64], size: int) -> npt.NDArray[np.int64]:
+    """Largest of each size x size window of a grid."""
+    rows, columns = (n - size + 1 for n in grid.shape)
+    window = range(size)
+    return np.asarray(np.max([grid[i : i + rows, j : j + columns] for i in window for j in window], axis=0))
+
+
+def _turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int64]:
+    """Caustics passed in each cell where J < 0 and where J > 0: that of its corners of that sign.
+
+    A fold that reaches into a cell, but to none of its corners, has them in the next cell.
+    """
+    none = -(1 << 30)
+    branches = []
+    for sign in (-1.0, 1.0):
+        known = np.where(area * sign > 0.0, turns, none)
+        corner, near = _largest(known, 2), _largest(np.pad(known, 1, constant_values=none), 4)
+        branches.append(np.where(corner > none, corner, np.where(near > none, near, 0)))
+    return np.stack(branches, axis=-1)
+
+
+def fields(
+    paths: Paths, wavelength: float, *, carrier: bool, half_wave_loss: bool = True
+) -> tuple[ComplexArray, FloatArray]:
+    """Mean field and mean irradiance of each pixel, from sheets between the arrivals of a beam.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of a `Beam`, onto a CCD, off smooth surfaces: one path key is one smooth wavefront.
+    wavelength : float, metres
+    carrier : bool
+        Whether the mean field matters: then pixels are sampled for the whole slope of the phase;
+        otherwise for the differences between the sheets that overlap.
+    half_wave_loss : bool
+        False leaves out the factor -1 of each reflection off a mirror.
+
+    Returns
+    -------
+    mean : (rows, columns) complex128
+    irradiance : (rows, columns) float64
+
+    Raises
+    ------
+    ValueError
+        If the source is no beam, or there is no CCD, or the wavelength is none.
+    """
+    ccd, beam = checked(paths)
+    period = checked_wavelength(wavelength)
+    if not half_wave_loss:
+        paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
+    parts = [(cells(sheet, ccd), sheet.base) for sheet in sheets(paths)]
+    unit = beam.area / ccd.pitch**2
+
+    def light(points: Samples, slope: FloatArray) -> ComplexArray:
+        from fringetrace import raster
+
+        total = points.blank()
+        for part, base in parts:
+            field = points.blank()
+            raster.spread(
+                part.leaves, part.coefficients, part.folded, part.turns, unit, period, points.top,
+                points.columns, points.first, points.x, points.y, field, slope,
+            )  # fmt: skip
+            total += field * np.exp(2j * np.pi * np.fmod(base, period) / period)
+        return total
+
+    rows, columns = ccd.shape
+    slope = np.tile([np.inf, -np.inf, np.inf, -np.inf], (rows * columns, 1))
+    light(samples(np.ones(ccd.shape, dtype=np.int64), 0), slope)
+    order = gauss_order(fringes(slope.reshape(rows, columns, 4), carrier) / period)
+    return averaged(order, lambda points: light(points, np.empty((0, 4))))
