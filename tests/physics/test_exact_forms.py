@@ -381,7 +381,7 @@ def test_the_flat_back_of_a_lens_stays_flat():
     assert paths.length == pytest.approx([2.0 - math.sqrt(1 - 0.0125), math.sqrt(1 - 0.09)], rel=1e-15)
 
 
-@pytest.mark.parametrize("form", ["height field", "smooth"])
+@pytest.mark.parametrize("form", ["height field", pytest.param("smooth", marks=pytest.mark.slow)])
 def test_no_ray_falls_through_waves(form):
     # 20 facets a wave, slopes up to 32 degrees
     rng = np.random.default_rng(37)
