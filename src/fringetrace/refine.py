@@ -193,17 +193,14 @@ def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
     """Hits of the form before those found, where a facet is near though the ray crosses none."""
     near = START / form.body.frame[3]
     for sense in (-1.0, 1.0):
-        guess = np.zeros(len(rays.own))
-        rows = (
-            np.arange(len(guess))
-            if form.fit.complete
-            else np.flatnonzero(rays.own & (rays.leaving == -sense))
-        )
-        side = np.full(len(rows), sense)
-        met = form.fit.meet(rays.origin[rows], rays.direction[rows], guess[rows], side, rays.last[rows])
-        same = rays.own[rows] & (rays.leaving[rows] == sense)
-        wanted = met.path > np.where(same, near, 0.0)
-        wanted &= met.path < best.path[rows] * (1.0 - START) - np.where(same, near, 0.0)
+        # a line crosses a quadric once in each sense: not again where it started, nor where it is found
+        found = np.isfinite(best.path) & (form.fit.along[best.face] != 0)
+        found &= np.einsum("ij,ij->i", best.normal, rays.direction) * sense > 0.0
+        untried = ~found if form.fit.complete else rays.own
+        rows = np.flatnonzero(untried & ~(rays.own & (rays.leaving == sense)))
+        some, side = rays.part(rows), np.full(len(rows), sense)
+        met = form.fit.meet(some.origin, some.direction, np.zeros(len(rows)), side, some.last)
+        wanted = (met.path > 0.0) & (met.path < best.path[rows] * (1.0 - START))
         kept = np.flatnonzero(wanted)
         reach = REACH * form.fit.sag + near
         start, down = met.point[kept] + reach * met.normal[kept], -met.normal[kept]

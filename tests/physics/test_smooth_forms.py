@@ -107,7 +107,7 @@ def test_patches_are_continuous_across_the_sides_of_faces():
     assert jumps[0][1] < 0.15 * jumps[1][1]  # normals are nearly so
 
 
-@pytest.mark.parametrize("grazing", [False, True])
+@pytest.mark.parametrize("grazing", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_room_of_patches_keeps_every_ray(grazing):
     rng = np.random.default_rng(3)
     count, bounces = 400, 40
