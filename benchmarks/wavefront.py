@@ -25,7 +25,7 @@ PIXELS = 256
 def paraboloid(count: int) -> tuple[ft.Paths, np.ndarray]:
     """A paraboloid of f = 50 mm, seen 30 mm before its focus; the truth by 4 x 4 Gauss points."""
     focal, z, side = 50 * mm, 20 * mm, 2 * mm
-    beam = ft.Beam((0, 0, 30 * mm), (0, 0, -1), (0, 1, 0), (5 * mm, 5 * mm), (count, count))
+    beam = ft.Beam((0, 0, 30 * mm), (0, 0, -1), (0, 1, 0), (3.6 * mm, 3.6 * mm), (count, count))
     ccd = ft.CCD((0, 0, z), (0, 0, -1), (0, 1, 0), side / PIXELS, (PIXELS, PIXELS))
     nodes, weights = np.polynomial.legendre.leggauss(4)
     x = ((np.arange(PIXELS)[:, None] + 0.5 + 0.5 * nodes).ravel() - 0.5 * PIXELS) * ccd.pitch
@@ -59,7 +59,7 @@ def valley(count: int) -> tuple[ft.Paths, np.ndarray]:
     height, angle, pitch = 2.0, 0.2e-3, 16e-6
     slope = math.tan(angle)
     mesh = ft.shapes.extrude([(-9 * mm, 9 * mm * slope), (0, 0), (9 * mm, 9 * mm * slope)], 30 * mm)
-    beam = ft.Beam((0, 0, 1.5), (0, 0, -1), (0, 1, 0), (14 * mm, 14 * mm), (count, count))
+    beam = ft.Beam((0, 0, 1.5), (0, 0, -1), (0, 1, 0), (6 * mm, 6 * mm), (count, count))
     ccd = ft.CCD((0, 0, height), (0, 0, -1), (0, 1, 0), pitch, (PIXELS, PIXELS))
     paths = ft.trace(ft.Scene([ft.Surface(mesh, ft.Mirror())]), beam, ccd)
     sides = (np.arange(PIXELS + 1) - 0.5 * PIXELS) * pitch

@@ -18,6 +18,8 @@ from fringetrace.exact import jit, part
 CELL, S0, S1, T0, T1, SIGN, LEFT, RIGHT, LOW, HIGH = range(10)
 # A leaf is regular when its least |J| is at least this part of its largest: Newton then stays in it.
 REGULAR = 0.35
+# A regular leaf reaches this part of its width beyond its probes at most, a fold a few times that.
+MARGIN = 0.03
 # A cell is halved this often at most.
 DEPTH = 6
 # Cells own their sides shifted by this part of a cell: a sample exactly on a side has one owner.
@@ -25,12 +27,14 @@ NUDGE_S, NUDGE_T = 1.2345e-9, 2.7183e-9
 
 
 @part
-def patch(c, s, t):
-    """Value of a bicubic and its derivatives along s and t."""
+def patch(cells, cell, f, s, t):
+    """Value of field f of a cell and its derivatives along s and t."""
     value, along_s, along_t = 0.0, 0.0, 0.0
     for i in range(3, -1, -1):
-        line = ((c[i, 3] * t + c[i, 2]) * t + c[i, 1]) * t + c[i, 0]
-        slope = (3.0 * c[i, 3] * t + 2.0 * c[i, 2]) * t + c[i, 1]
+        c0, c1 = cells[cell, f, i, 0], cells[cell, f, i, 1]
+        c2, c3 = cells[cell, f, i, 2], cells[cell, f, i, 3]
+        line = ((c3 * t + c2) * t + c1) * t + c0
+        slope = (3.0 * c3 * t + 2.0 * c2) * t + c1
         along_s = along_s * s + value
         value = value * s + line
         along_t = along_t * s + slope
@@ -38,27 +42,29 @@ def patch(c, s, t):
 
 
 @part
-def scalar(c, s, t):
-    """Value of a bicubic."""
+def scalar(cells, cell, f, s, t):
+    """Value of field f of a cell."""
     value = 0.0
     for i in range(3, -1, -1):
-        value = value * s + (((c[i, 3] * t + c[i, 2]) * t + c[i, 1]) * t + c[i, 0])
+        c0, c1 = cells[cell, f, i, 0], cells[cell, f, i, 1]
+        c2, c3 = cells[cell, f, i, 2], cells[cell, f, i, 3]
+        value = value * s + (((c3 * t + c2) * t + c1) * t + c0)
     return value
 
 
 @jit
-def survey(c, s0, s1, t0, t1):
+def survey(cells, cell, s0, s1, t0, t1):
     """Least and largest J, and the box, of part of a cell: of 5 x 5 probes, the box with a margin."""
     least, most = np.inf, -np.inf
     left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
     for i in range(5):
         for j in range(5):
-            x, xs, xt = patch(c[0], s0 + 0.25 * i * (s1 - s0), t0 + 0.25 * j * (t1 - t0))
-            y, ys, yt = patch(c[1], s0 + 0.25 * i * (s1 - s0), t0 + 0.25 * j * (t1 - t0))
+            x, xs, xt = patch(cells, cell, 0, s0 + 0.25 * i * (s1 - s0), t0 + 0.25 * j * (t1 - t0))
+            y, ys, yt = patch(cells, cell, 1, s0 + 0.25 * i * (s1 - s0), t0 + 0.25 * j * (t1 - t0))
             area = xs * yt - xt * ys
             least, most = min(least, area), max(most, area)
             left, right, low, high = min(left, x), max(right, x), min(low, y), max(high, y)
-    margin = 0.1 * max(right - left, high - low)
+    margin = MARGIN * max(right - left, high - low)
     return least, most, left - margin, right + margin, low - margin, high + margin
 
 
@@ -74,7 +80,7 @@ def split(cells, domain, rows, columns):
         while waiting > 0:
             waiting -= 1
             s0, s1, t0, t1, depth = stack[waiting]
-            least, most, left, right, low, high = survey(cells[cell], s0, s1, t0, t1)
+            least, most, left, right, low, high = survey(cells, cell, s0, s1, t0, t1)
             if right <= 0.0 or left >= columns or high <= 0.0 or low >= rows:
                 continue
             sign = 0.0
@@ -97,19 +103,22 @@ def split(cells, domain, rows, columns):
                 larger[:count] = leaves
                 leaves = larger
             leaves[count, :5] = np.array([float(cell), s0, s1, t0, t1])
-            leaves[count, 5:] = np.array([sign, left, right, low, high])
+            more = 0.0 if even else 0.1 * max(right - left, high - low)
+            leaves[count, 5:] = np.array([sign, left - more, right + more, low - more, high + more])
             count += 1
     return leaves[:count]
 
 
 @part
-def root(c, leaf, sign, s, t, x, y):
+def root(cells, cell, s0, s1, t0, t1, fold, sign, s, t, x, y):
     """Where in a leaf the map meets (x, y), from (s, t) on: found, s, t and the Jacobian there."""
-    wide, tall = leaf[S1] - leaf[S0], leaf[T1] - leaf[T0]
+    wide, tall = s1 - s0, t1 - t0
+    # a regular leaf bends too little to throw a step from inside it out by half its width
+    leave = 2.0 if fold else 0.5
     area = 0.0
     for _ in range(12):
-        px, xs, xt = patch(c[0], s, t)
-        py, ys, yt = patch(c[1], s, t)
+        px, xs, xt = patch(cells, cell, 0, s, t)
+        py, ys, yt = patch(cells, cell, 1, s, t)
         area = xs * yt - xt * ys
         if area * sign <= 0.0:
             return False, s, t, area
@@ -118,25 +127,33 @@ def root(c, leaf, sign, s, t, x, y):
         stretch = max(abs(ds) / wide, abs(dt) / tall)
         if stretch > 0.75:
             ds, dt = ds * 0.75 / stretch, dt * 0.75 / stretch
-        for _ in range(6):  # a step over the fold is halved
-            _, xs, xt = patch(c[0], s + ds, t + dt)
-            _, ys, yt = patch(c[1], s + ds, t + dt)
-            if (xs * yt - xt * ys) * sign > 0.0:
-                break
-            ds, dt = 0.5 * ds, 0.5 * dt
+        if fold:
+            ds, dt = halved(cells, cell, sign, s, t, ds, dt)
         s, t = s + ds, t + dt
         if stretch < 1e-6:
             break
-        if s < leaf[S0] - 2.0 * wide or s > leaf[S1] + 2.0 * wide:
+        if s < s0 - leave * wide or s > s1 + leave * wide:
             return False, s, t, area
-        if t < leaf[T0] - 2.0 * tall or t > leaf[T1] + 2.0 * tall:
+        if t < t0 - leave * tall or t > t1 + leave * tall:
             return False, s, t, area
     u, v = s + NUDGE_S, t + NUDGE_T
-    return leaf[S0] <= u < leaf[S1] and leaf[T0] <= v < leaf[T1], s, t, area
+    return (s0 <= u < s1 and t0 <= v < t1), s, t, area
+
+
+@jit
+def halved(cells, cell, sign, s, t, ds, dt):
+    """A step, halved until it does not cross the fold."""
+    for _ in range(6):
+        _, xs, xt = patch(cells, cell, 0, s + ds, t + dt)
+        _, ys, yt = patch(cells, cell, 1, s + ds, t + dt)
+        if (xs * yt - xt * ys) * sign > 0.0:
+            break
+        ds, dt = 0.5 * ds, 0.5 * dt
+    return ds, dt
 
 
 @part
-def probe(c, leaf, sign):
+def probe(cells, cell, leaf, sign):
     """Where to start in a leaf: its middle, or in a fold the probe with the largest J of that sign."""
     best, at_s, at_t = 0.0, 0.5 * (leaf[S0] + leaf[S1]), 0.5 * (leaf[T0] + leaf[T1])
     if leaf[SIGN] != 0.0:
@@ -145,8 +162,8 @@ def probe(c, leaf, sign):
         for j in range(5):
             s = leaf[S0] + 0.25 * i * (leaf[S1] - leaf[S0])
             t = leaf[T0] + 0.25 * j * (leaf[T1] - leaf[T0])
-            _, xs, xt = patch(c[0], s, t)
-            _, ys, yt = patch(c[1], s, t)
+            _, xs, xt = patch(cells, cell, 0, s, t)
+            _, ys, yt = patch(cells, cell, 1, s, t)
             area = sign * (xs * yt - xt * ys)
             if area > best:
                 best, at_s, at_t = area, s, t
@@ -170,12 +187,13 @@ def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y
         begin, end = max(int(np.floor(leaf[LEFT])), 0), min(int(np.floor(leaf[RIGHT])), columns - 1)
         if bottom > above:
             continue
-        c = cells[cell]
+        s0, s1, t0, t1, fold = leaf[S0], leaf[S1], leaf[T0], leaf[T1], leaf[SIGN] == 0.0
+        bent = folded[cell]
         for branch in range(2):
             sign = 2.0 * branch - 1.0
             if leaf[SIGN] == -sign:
                 continue
-            there, s, t = probe(c, leaf, sign)
+            there, s, t = probe(cells, cell, leaf, sign)
             if not there:
                 continue
             phase = np.exp(-0.5j * np.pi * turns[cell, branch])
@@ -183,18 +201,22 @@ def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y
                 for j in range(begin, end + 1):
                     pixel = (i - top) * columns + j
                     for k in range(first[pixel], first[pixel + 1]):
-                        found, a, b, area = root(c, leaf, sign, s, t, x[k], y[k])
+                        found, a, b, area = root(cells, cell, s0, s1, t0, t1, fold, sign, s, t, x[k], y[k])
                         if not found:
                             continue
-                        way, ws, wt = patch(c[2], a, b)
-                        spreading = abs(area) if folded[cell] else abs(scalar(c[3], a, b))
+                        if not fold:  # the next sample is near
+                            s, t = a, b
+                        way, ws, wt = patch(cells, cell, 2, a, b)
+                        spreading = abs(area) if bent else abs(scalar(cells, cell, 3, a, b))
                         size = np.sqrt(unit / spreading)
-                        amplitude = complex(scalar(c[4], a, b), scalar(c[5], a, b)) * phase
+                        amplitude = (
+                            complex(scalar(cells, cell, 4, a, b), scalar(cells, cell, 5, a, b)) * phase
+                        )
                         turn = 2.0 * np.pi * ((way % period) / period)
                         field[k] += size * amplitude * complex(np.cos(turn), np.sin(turn))
                         if len(slope) > 0:
-                            _, xs, xt = patch(c[0], a, b)
-                            _, ys, yt = patch(c[1], a, b)
+                            _, xs, xt = patch(cells, cell, 0, a, b)
+                            _, ys, yt = patch(cells, cell, 1, a, b)
                             widen(slope[k], (ws * yt - wt * ys) / area, (wt * xs - ws * xt) / area)
 
 

@@ -219,11 +219,15 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
 
 def _crossings(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, size: float) -> FloatArray:
     """Where between lit and dark points (n, 2), a side apart, the light ends: by halving."""
+    # neighbouring cells of a wave share their side
+    bits = np.column_stack([np.column_stack([bright, dark]).view(np.int64), names.view(np.int64)])
+    _, first, again = np.unique(bits, axis=0, return_index=True, return_inverse=True)
+    bright, dark, names = bright[first], dark[first], names[first]
     for _ in range(HALVINGS + round(np.log2(size))):
         middle = 0.5 * (bright + dark)
         lit = probe.lit(middle, names)[:, None]
         bright, dark = np.where(lit, middle, bright), np.where(lit, dark, middle)
-    return np.asarray(0.5 * (bright + dark), dtype=np.float64)
+    return np.asarray(0.5 * (bright + dark)[again.ravel()], dtype=np.float64)
 
 
 def _chords(probe: Probe, low: FloatArray, size: float, lit: Array, names: Array) -> tuple[FloatArray, Array]:
