@@ -173,7 +173,7 @@ def test_a_wavelength_in_text():
 
 def test_methods_that_are_none():
     paths = ft.trace(EMPTY, scattered(2), ccd())
-    with pytest.raises(ValueError, match="method: expected 'rays', got 'waves'"):
+    with pytest.raises(ValueError, match="method: expected 'rays' or 'wavefront', got 'waves'"):
         ft.complex_field(paths, 633 * nm, method="waves")
 
 
