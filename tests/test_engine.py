@@ -330,6 +330,20 @@ def test_rays_into_the_seams_of_a_corner_come_back(where, parts):
     assert_comes_back(ft.trace(corner(parts), ft.Rays(aim - 0.5 * direction, direction)))
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("substrate", [shapes.plate(3.0, 3.0), shapes.plate(3.0, 3.0, 0.5)])
+def test_light_that_goes_through_a_splitter_meets_what_lies_on_it(substrate, side):
+    coating = ft.Surface(shapes.plate(2.0, 2.0), ft.BeamSplitter(0.6j, 0.8))
+    scene = ft.Scene([coating, ft.Surface(substrate, ft.Absorber())])
+    paths = ft.trace(scene, ft.Rays([(0.1, 0.3, side)], [(0.0, 0.0, -side)]))
+    if side < 0.0 and len(substrate.faces) > 2:  # from below a solid one hides the coating
+        assert paths.fate.tolist() == [ft.Fate.ABSORBED]
+    else:
+        assert sorted(paths.fate.tolist()) == [ft.Fate.LEFT, ft.Fate.ABSORBED]
+        np.testing.assert_allclose(paths.ledger().absorbed, 0.64, rtol=1e-14)
+        assert paths.length.tolist() == [1.0, 1.0]
+
+
 @pytest.mark.parametrize("gap", [1e-6, 10 * nm, 1 * nm])
 @pytest.mark.parametrize("thickness", [None, 0.002])
 def test_a_thin_gap_between_two_plates(gap, thickness):
@@ -601,6 +615,17 @@ def test_threads_and_chunks_change_no_bit(splits, record):
             expected = expected or found
             assert found == expected
     assert (paths.fate == ft.Fate.DETECTED).any()
+
+
+@pytest.mark.parametrize("splits", [False, True])
+def test_a_record_changes_no_bit(splits):
+    scene = half_silvered() if splits else mirrors(shapes.icosphere(1.0, 3), shapes.icosphere(0.1, 1))
+    rays = within(np.random.default_rng(15), -0.3, 0.3, 500)
+    ccd = ft.CCD((0, 0, 0.5), (1, 2, 3), (0, 1, 0), 0.01, (20, 20))
+    bare, recorded = (ft.trace(scene, rays, ccd, max_bounces=8, record=record) for record in (False, True))
+    assert ends(bare) == ends(recorded)
+    assert (bare.segments, bare.incident) == (recorded.segments, recorded.incident)
+    assert bare.bounces[bare.fate == ft.Fate.DETECTED].max() > 2
 
 
 def test_one_ray_in_a_chunk_changes_no_bit():
