@@ -27,7 +27,7 @@ from embreex.rtcore_scene import EmbreeScene
 
 import fringetrace as ft
 
-ROUNDS = 5
+ROUNDS = 3
 
 
 def seconds(work) -> float:

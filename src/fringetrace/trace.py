@@ -244,10 +244,13 @@ def _paths(
         # a ray's ends come in an order that does not depend on other rays: a stable sort keeps it
         order = kernels.sort(ends.ray, first, len(launched))
         ends = Ends(**{name: column[order] for name, column in vars(ends).items()})
+    # a broadcast 1 (no strides) stands for amplitudes that are all 1
     relative = launched[ends.ray - first] if len(ends.ray) > len(launched) else launched
     if plan.plain:
         reflections, lost = ends.bounces, np.zeros(len(ends.ray))
-        amplitude = relative * (1.0 - 2.0 * (ends.bounces % 2))
+        amplitude = np.array([1.0, -1.0], dtype=np.complex128)[ends.bounces & 1]
+        if launched.strides != (0,):  # not all 1
+            amplitude *= relative
     else:
         reflections, lost = ends.reflections, ends.lost * np.abs(relative) ** 2
         amplitude = relative * ends.amplitude
@@ -263,7 +266,7 @@ def _paths(
         lost=lost,
         key=ends.key,
         area=plan.source.area,
-        incident=float((np.abs(launched) ** 2).sum()),
+        incident=float(len(launched) if launched.strides == (0,) else (np.abs(launched) ** 2).sum()),
         segments=segments,
         doubtful=doubtful,
         scene=plan.scene,
