@@ -7,7 +7,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version as _version
 from typing import TYPE_CHECKING, Any
 
 from fringetrace.field import complex_field, irradiance
@@ -19,9 +18,8 @@ from fringetrace.trace import stream, trace
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
+    __version__: str
     from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
-
-__version__ = _version("fringetrace")
 
 __all__ = [
     "CCD",
@@ -61,8 +59,12 @@ _ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views
 def __getattr__(name: str) -> Any:
     if name in _ROOMS:
         return import_module(f"fringetrace.{name}")
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("fringetrace")
     raise AttributeError(f"module 'fringetrace' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_ROOMS])
+    return sorted([*globals(), *_ROOMS, "__version__"])

@@ -363,6 +363,8 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
                 offset[i] = first
                 first += len(scene.surfaces[i].mesh.faces)
                 owner.append(np.full(len(scene.surfaces[i].mesh.faces), i, dtype=np.int32))
+            # before threads share them
+            _ = body.packed, body.embree
             bodies.append(body)
         scene.derived[name] = Engine(tuple(bodies), np.concatenate(owner), offset)
     engine: Engine = scene.derived[name]

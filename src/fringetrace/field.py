@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from fringetrace import regions, sheets
 from fringetrace.paths import Paths, join, screen
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
 
@@ -101,6 +100,8 @@ def _wavefront(
     paths: Paths | Iterable[Paths], wavelength: float, carrier: bool, half_wave_loss: bool
 ) -> tuple[ComplexArray, FloatArray]:
     """Mean field and irradiance: sheets off smooth surfaces, which have no triangles, or off facets."""
+    from fringetrace import regions, sheets
+
     parts = [paths] if isinstance(paths, Paths) else list(paths)
     if not parts:
         raise ValueError("wavefront: expected at least one Paths, got none")

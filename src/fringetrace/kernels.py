@@ -374,6 +374,7 @@ def rebound(
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
     unscale, sure = 1.0 / scale, 4.0 * frame[6]
     kept, doubtful = 0, 0
+    many = base > np.uint64(3)  # else there is one surface, and one digit
     for row in range(count):
         guess = np.int64(prim[row])
         gx, gy, gz = state[row, OX], state[row, OY], state[row, OZ]
@@ -446,7 +447,7 @@ def rebound(
         state[kept, DX], state[kept, DY], state[kept, DZ] = dx, dy, dz
         state[kept, WAY], state[kept, EDGE] = state[row, WAY] + path, inside
         state[kept, LEAVING], last[kept] = -facing, guess
-        key[kept] = key[row] * base + np.uint64(digit[k])
+        key[kept] = key[row] * base + np.uint64(digit[k] if many else 1)
         ray[kept] = ray[row]
         x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz, -facing, abs(inverted))
         origin32[kept, 0], origin32[kept, 1], origin32[kept, 2] = x, y, z

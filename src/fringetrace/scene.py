@@ -6,15 +6,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from numbers import Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.forms import Form
 from fringetrace.interfaces import Interface
 from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, frame
 from fringetrace.waves import Array, FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.forms import Form
 
 # A face is degenerate when its height is below this part of its longest side: less than what
 # float64 coordinates can express, and far below any needle that still has a normal.

@@ -10,17 +10,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from numbers import Real
 from queue import Empty, SimpleQueue
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
 from fringetrace.engine import Engine, Hits, Limits, aim, build, find, follow
 from fringetrace.paths import Fate, Paths, join, screen
 from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
-from fringetrace.refine import Formed, formed
-from fringetrace.refine import find as find_exact
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.waves import Array, ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.refine import Formed
 
 Progress = Callable[[int, int], None]
 Result = TypeVar("Result")
@@ -69,6 +70,14 @@ def _whole(value: int, least: int, what: str) -> int:
     return int(value)
 
 
+def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
+    if all(surface.form is None for surface in scene.surfaces):
+        return ()
+    from fringetrace.refine import formed
+
+    return formed(scene, engine)
+
+
 def _plan(
     scene: Scene, source: Beam | Rays, ccd: CCD | None, max_bounces: int, min_amplitude: float, record: bool
 ) -> Plan:
@@ -93,7 +102,7 @@ def _plan(
         source=source,
         ccd=ccd,
         engine=engine,
-        forms=formed(scene, engine),
+        forms=_forms(scene, engine),
         passed=passed,
         reflection=reflection,
         transmission=transmission,
@@ -195,6 +204,8 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
         state, hits = space.state, space.hits
         segments += count
         if plan.forms:
+            from fringetrace.refine import find as find_exact
+
             doubtful += find_exact(plan.engine, plan.forms, state, count, hits, passed)
         else:
             doubtful += find(plan.engine, state, count, hits, passed)
@@ -274,6 +285,13 @@ def _paths(
         ccd=plan.ccd,
         **({} if record is None else _recorded(plan, record, ends)),
     )
+
+
+def _chunk(plan: Plan, chunk: int | None) -> int:
+    """Rays to be followed at a time: fewer where each may become several."""
+    if chunk is None:
+        return CHUNK // 4 if plan.splits else CHUNK
+    return _whole(chunk, 1, "chunk")
 
 
 def _pooled(
@@ -367,7 +385,7 @@ def stream(
     min_amplitude: float = 1e-6,
     record: bool = False,
     threads: int | None = None,
-    chunk: int = CHUNK,
+    chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Paths]:
     """Trace in chunks that need not fit into memory together; arguments as for `trace`.
@@ -384,7 +402,7 @@ def stream(
     """
     plan = _plan(scene, source, ccd, max_bounces, min_amplitude, record)
     workers = None if threads is None else _whole(threads, 1, "threads")
-    return _in_chunks(plan, workers, _whole(chunk, 1, "chunk"), progress)
+    return _in_chunks(plan, workers, _chunk(plan, chunk), progress)
 
 
 def trace(
@@ -396,7 +414,7 @@ def trace(
     min_amplitude: float = 1e-6,
     record: bool = False,
     threads: int | None = None,
-    chunk: int = CHUNK,
+    chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Paths:
     """Follow rays through a scene until they are detected, leave, or are cut off.
@@ -415,8 +433,9 @@ def trace(
         Keep every hit (`Paths.polyline`, `surface`, `triangle`).
     threads : int, optional
         Default: one for each core. Results are the same bits for any number.
-    chunk : int
-        Rays a thread follows at a time. Results are the same bits for any number.
+    chunk : int, optional
+        Rays a thread follows at a time; default 32768, or 8192 where rays split. Results are the
+        same bits for any number.
     progress : callable, optional
         Called with (rays done, rays in all) after each chunk.
 
@@ -433,7 +452,7 @@ def trace(
     """
     plan = _plan(scene, source, ccd, max_bounces, min_amplitude, record)
     workers = None if threads is None else _whole(threads, 1, "threads")
-    size = _whole(chunk, 1, "chunk")
+    size = _chunk(plan, chunk)
     if not (plan.splits or record):
         return _at_once(plan, workers, size, progress)
     return join(list(_in_chunks(plan, workers, size, progress)))
