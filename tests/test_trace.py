@@ -559,7 +559,7 @@ def test_arguments_of_the_wrong_kind(run, arguments, error, message):
         ("threads", 0, "threads: expected a whole number of at least 1, got 0"),
         ("threads", 1.5, "threads: expected a whole number of at least 1, got 1.5"),
         ("chunk", 0, "chunk: expected a whole number of at least 1, got 0"),
-        ("chunk", None, "chunk: expected a whole number of at least 1, got None"),
+        ("chunk", 2.5, "chunk: expected a whole number of at least 1, got 2.5"),
     ],
 )
 def test_numbers_that_are_none(run, name, value, message):
