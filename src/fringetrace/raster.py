@@ -3,7 +3,8 @@
 A sheet maps grid coordinates (s along columns, t along rows) to CCD coordinates in pixels. A cell of
 a curved sheet has the fields X, Y, W, J, and the two parts of the amplitude, each as the 4 x 4
 coefficients of s^i t^j. A leaf is a part of a cell on which J keeps its sign: its columns are the
-cell, s and t from and to, the sign of J (0: unknown, a fold), and the box around it in pixels.
+cell, s and t from and to, the sign of J (0: unknown, a fold), the box around it in pixels, and a line:
+the sheet is there where a s + b t >= c only.
 
 Sample points are in compressed rows: those of pixel i of a band are first[i] to first[i + 1].
 """
@@ -15,7 +16,7 @@ import numpy as np
 from fringetrace.exact import jit, part
 
 # Columns of a leaf.
-CELL, S0, S1, T0, T1, SIGN, LEFT, RIGHT, LOW, HIGH = range(10)
+CELL, S0, S1, T0, T1, SIGN, LEFT, RIGHT, LOW, HIGH, A, B, C = range(13)
 # A leaf is regular when its least |J| is at least this part of its largest: Newton then stays in it.
 REGULAR = 0.35
 # A regular leaf reaches this part of its width beyond its probes at most, a fold a few times that.
@@ -69,9 +70,12 @@ def survey(cells, cell, s0, s1, t0, t1):
 
 
 @jit
-def split(cells, domain, rows, columns):
-    """Leaves of cells, those that no pixel sees left out."""
-    leaves = np.empty((2 * len(cells) + 64, 10))
+def split(cells, domain, lines, rows, columns):
+    """Leaves of cells, from their domains (s from and to, t from and to) and lines (a, b, c).
+
+    Those that no pixel sees are left out.
+    """
+    leaves = np.empty((2 * len(cells) + 64, 13))
     count = 0
     stack = np.empty((4 * DEPTH + 8, 5))
     for cell in range(len(cells)):
@@ -99,12 +103,13 @@ def split(cells, domain, rows, columns):
                         waiting += 1
                 continue
             if count == len(leaves):
-                larger = np.empty((2 * count, 10))
+                larger = np.empty((2 * count, 13))
                 larger[:count] = leaves
                 leaves = larger
             leaves[count, :5] = np.array([float(cell), s0, s1, t0, t1])
             more = 0.0 if even else 0.1 * max(right - left, high - low)
-            leaves[count, 5:] = np.array([sign, left - more, right + more, low - more, high + more])
+            leaves[count, 5:10] = np.array([sign, left - more, right + more, low - more, high + more])
+            leaves[count, 10:] = lines[cell]
             count += 1
     return leaves[:count]
 
@@ -202,7 +207,7 @@ def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y
                     pixel = (i - top) * columns + j
                     for k in range(first[pixel], first[pixel + 1]):
                         found, a, b, area = root(cells, cell, s0, s1, t0, t1, fold, sign, s, t, x[k], y[k])
-                        if not found:
+                        if not found or leaf[A] * a + leaf[B] * b < leaf[C]:
                             continue
                         if not fold:  # the next sample is near
                             s, t = a, b

@@ -324,7 +324,8 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
         ], axis=1,
     )  # fmt: skip
     chosen = np.ascontiguousarray(coefficients[whole])
-    leaves = raster.split(chosen, domain, *ccd.shape)
+    lines = np.tile([0.0, 0.0, -1.0], (len(chosen), 1))  # all of each cell
+    leaves = raster.split(chosen, domain, lines, *ccd.shape)
     folded = np.zeros(len(chosen), dtype=np.bool_)
     signs = np.zeros((len(chosen), 2), dtype=np.bool_)
     for branch, sign in enumerate((-1.0, 1.0)):
