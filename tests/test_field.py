@@ -1,6 +1,7 @@
 """From arrivals to the complex field: the ray sum, its weights and its digits."""
 
 import math
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -8,7 +9,9 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import nm, shapes, um
+from fringetrace.field import method_for
 from fringetrace.paths import join
+from fringetrace.quadrature import mutual_products
 
 # Sums of a few hundred terms of size 1.
 ROUNDING = 1e-12
@@ -80,9 +83,11 @@ def test_an_oblique_beam_gives_the_square_of_the_cosine():
     for wavelength in (1e6, 1.0, 0.3, 0.07):
         slope = 2 * np.pi * 2 * spacing * direction[0] / wavelength
         expected = 0.5 * np.sin(across * slope / 2) / (across * np.sin(slope / 2))
-        field = ft.complex_field(paths, wavelength)
+        field = ft.complex_field(paths, wavelength, "rays")
         np.testing.assert_allclose(np.abs(field), abs(expected), rtol=1e-10)
-    assert np.abs(ft.complex_field(paths, 1e6)) ** 2 == pytest.approx(np.full((8, 16), 0.25), rel=1e-9)
+    assert ft.irradiance(paths, 1e6, "rays") == pytest.approx(np.full((8, 16), 0.25), rel=1e-9)
+    # the wavefront keeps the power: irradiance cos
+    assert ft.irradiance(paths, 633 * nm) == pytest.approx(np.full((8, 16), 0.5), rel=1e-9)
 
 
 def test_the_half_wave_loss_can_be_left_out():
@@ -155,6 +160,57 @@ def test_light_that_does_not_reach_the_ccd_leaves_no_trace():
     assert not ft.complex_field(paths, 633 * nm).any()
 
 
+# The method by itself
+
+
+def test_the_wavefront_is_taken_where_facets_are_few():
+    paths = ft.trace(EMPTY, scattered(2), ccd())
+    assert method_for(paths) == "rays"
+    beam = ft.Beam((0, 0, 0), (0, 0, 1), (0, 1, 0), (0.5, 0.5), (40, 40))
+
+    def method(mesh, form=None, shape=(40, 40)):
+        scene = ft.Scene([ft.Surface(mesh, ft.Mirror(), form=form)])
+        return method_for(ft.trace(scene, replace(beam, shape=shape), ccd(), max_bounces=1))
+
+    assert method(shapes.plate(4.0, 4.0)) == "wavefront"
+    ball = shapes.icosphere(0.4, 3)  # 1280 facets
+    assert method(ball) == "rays"
+    assert method(ball, shape=(160, 160)) == "wavefront"
+    assert method(ball, ft.forms.Sphere((0, 0, 0), 0.4)) == "wavefront"
+    # coplanar triangles are one facet
+    assert method(shapes.height_map(np.zeros((40, 40)), 0.1)) == "wavefront"
+
+
+# Groups
+
+
+@pytest.mark.parametrize("method", ["rays", "wavefront"])
+def test_mutual_intensity_adds_up_to_the_irradiance(method):
+    splitter = ft.BeamSplitter(0.6j, 0.8)
+    scene = ft.Scene([mirror_at(0.0), mirror_at(0.75, splitter)])
+    beam = ft.Beam((0, 0, 0.5), (0, 0, -1), (0, 1, 0), (12 / 16, 8 / 16), (16, 24))
+    paths = ft.trace(scene, beam, ccd(), max_bounces=7)
+    bounces = paths.visits(0) - 1
+    groups = np.maximum(bounces, 0)
+    count = groups.max() + 1
+    fields = ft.complex_field(paths, 633 * nm, method, groups=groups)
+    mutual = ft.mutual_intensity(paths, 633 * nm, groups, method)
+    assert fields.shape == (count, 8, 12)
+    assert mutual.shape == (count, count, 8, 12)
+    np.testing.assert_allclose(fields.sum(axis=0), ft.complex_field(paths, 633 * nm, method), atol=ROUNDING)
+    np.testing.assert_allclose(mutual.sum(axis=(0, 1)), ft.irradiance(paths, 633 * nm, method), atol=1e-9)
+    np.testing.assert_allclose(mutual, np.conj(mutual.swapaxes(0, 1)), atol=ROUNDING)
+    # plane waves straight on: no fringe to average
+    np.testing.assert_allclose(mutual, mutual_products(fields), atol=1e-9)
+
+
+@pytest.mark.parametrize("groups", [[0], [-1, 0], [0.0, 1.0]])
+def test_groups_that_do_not_fit(groups):
+    paths = ft.trace(EMPTY, scattered(2), ccd())
+    with pytest.raises(ValueError, match="groups: expected 2 whole numbers from 0 on, one a path, got"):
+        ft.complex_field(paths, 633 * nm, groups=groups)
+
+
 # What is refused
 
 
@@ -173,7 +229,7 @@ def test_a_wavelength_in_text():
 
 def test_methods_that_are_none():
     paths = ft.trace(EMPTY, scattered(2), ccd())
-    with pytest.raises(ValueError, match="method: expected 'rays' or 'wavefront', got 'waves'"):
+    with pytest.raises(ValueError, match="method: expected 'auto', 'wavefront' or 'rays', got 'waves'"):
         ft.complex_field(paths, 633 * nm, method="waves")
 
 
@@ -181,11 +237,11 @@ def test_a_field_needs_a_ccd():
     paths = ft.trace(EMPTY, scattered(2))
     for given in (paths, [paths], iter([paths])):
         with pytest.raises(
-            ValueError, match="complex_field: expected paths traced onto a CCD, got paths without one"
+            ValueError, match="field: expected paths traced onto a CCD, got paths without one"
         ):
             ft.complex_field(given, 633 * nm)
 
 
 def test_a_field_needs_paths():
-    with pytest.raises(ValueError, match="complex_field: expected at least one Paths, got none"):
+    with pytest.raises(ValueError, match="field: expected at least one Paths, got none"):
         ft.complex_field([], 633 * nm)

@@ -130,4 +130,4 @@ def test_what_is_refused():
     with pytest.raises(ValueError, match="paths traced onto a CCD"):
         ft.irradiance(replace(paths, ccd=None), HENE)
     with pytest.raises(ValueError, match="paths of a Beam, got those of Rays"):
-        ft.irradiance(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE)
+        ft.irradiance(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE, "wavefront")

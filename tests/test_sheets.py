@@ -129,10 +129,10 @@ def test_what_is_refused():
     with pytest.raises(ValueError, match="paths traced onto a CCD"):
         ft.irradiance(replace(paths, ccd=None), HENE)
     with pytest.raises(ValueError, match="paths of a Beam, got those of Rays"):
-        ft.irradiance(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE)
+        ft.irradiance(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE, "wavefront")
     with pytest.raises(ValueError, match="at least one Paths, got none"):
         ft.complex_field([], HENE, "wavefront")
-    with pytest.raises(ValueError, match="'rays' or 'wavefront', got 'guess'"):
+    with pytest.raises(ValueError, match="'wavefront' or 'rays', got 'guess'"):
         ft.complex_field(paths, HENE, "guess")
     with pytest.raises(ValueError, match="wavelength"):
         ft.irradiance(paths, -1.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from fringetrace.field import complex_field, irradiance
+from fringetrace.field import complex_field, irradiance, mutual_intensity
 from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -42,6 +42,7 @@ __all__ = [
     "irradiance",
     "meshes",
     "mm",
+    "mutual_intensity",
     "nm",
     "phase",
     "shapes",

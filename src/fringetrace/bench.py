@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from fringetrace import phase
-from fringetrace.field import complex_field
+from fringetrace.field import complex_field, method_for, mutual_intensity
 from fringetrace.paths import Paths
+from fringetrace.quadrature import mutual_products
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.trace import stream, trace
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength, wavenumber
@@ -32,6 +33,9 @@ class Bench:
         Number of the surface that sends the reference wave back, and that a phase step moves.
     tilt : (tilt_x, tilt_y), radians
         Tilt of that mirror, see `michelson`.
+    method : {"auto", "wavefront", "rays"}
+        How arrivals become light on the pixels, see `complex_field`. "wavefront" averages over each
+        pixel; with "rays" each ray counts at the centre of its part of the pixel, see `centred`.
     """
 
     scene: Scene
@@ -39,7 +43,8 @@ class Bench:
     ccd: CCD
     reference: int
     tilt: tuple[float, float] = (0.0, 0.0)
-    # the paths once traced, and the fields of the last wavelength
+    method: str = "auto"
+    # the paths once traced, and the light of the last wavelength
     derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -81,7 +86,7 @@ class Bench:
         return trace(self.scene, beam, self.ccd, record=True)
 
     def fields(self, wavelength: float) -> ComplexArray:
-        """Fields on the CCD, one for each number of visits to the reference mirror.
+        """Mean fields on the pixels, one for each number of visits to the reference mirror.
 
         Parameters
         ----------
@@ -91,15 +96,51 @@ class Bench:
         -------
         (n, rows, columns) complex128, n at least 2
             [0] is the light that met the sample only, [1] the reference. A phase step of delta
-            on the reference multiplies [m] by exp(i m delta). Each ray counts at the centre of
-            its part of the pixel, see `centred`.
+            on the reference multiplies [m] by exp(i m delta).
         """
+        return self._light(wavelength, "fields")
+
+    def mutual(self, wavelength: float) -> ComplexArray:
+        """Mutual intensities on the pixels of the light with m and n visits to the reference mirror.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+
+        Returns
+        -------
+        (n, n, rows, columns) complex128, n at least 2
+            Mean of E_m conj(E_n) over each pixel, see `mutual_intensity`: fringes finer than a
+            pixel have lost their visibility.
+        """
+        return self._light(wavelength, "mutual")
+
+    def _light(self, wavelength: float, what: str) -> ComplexArray:
+        """Fields or mutual intensities, kept for the last wavelength."""
+        kept = self.derived.setdefault("light", {})
         wavelength = checked_wavelength(wavelength)
-        if self.derived.get("wavelength") != wavelength:
-            self.derived["fields"] = self._summed(self.trace().detected, wavelength)
-            self.derived["wavelength"] = wavelength
-        fields: ComplexArray = self.derived["fields"]
-        return fields
+        if (wavelength, what) not in kept:
+            for key in [key for key in kept if key[0] != wavelength]:
+                del kept[key]
+            kept[wavelength, what] = self._found(wavelength, what)
+        light: ComplexArray = kept[wavelength, what]
+        return light
+
+    def _found(self, wavelength: float, what: str) -> ComplexArray:
+        paths = self.trace()
+        if self._chosen(paths) == "rays":
+            if what == "mutual":
+                return mutual_products(self.fields(wavelength))
+            return self._summed(paths.detected, wavelength)
+        visits = paths.visits(self.reference)
+        find = mutual_intensity if what == "mutual" else complex_field
+        light = find(paths, wavelength, groups=visits, method="wavefront")
+        groups = light.shape[:-2]
+        missing = [(0, max(0, 2 - n)) for n in groups]
+        return np.pad(light, [*missing, (0, 0), (0, 0)])
+
+    def _chosen(self, paths: Paths) -> str:
+        return method_for(paths) if self.method == "auto" else self.method
 
     def stream_fields(
         self,
@@ -133,7 +174,7 @@ class Bench:
         parts = max(1, self.beam.shape[1] // self.ccd.shape[1])
         visits, paths = paths.visits(self.reference), centred(paths, parts)
         orders = range(max(2, int(visits.max(initial=0)) + 1))
-        return np.stack([complex_field(paths.where(visits == order), wavelength) for order in orders])
+        return np.stack([complex_field(paths.where(visits == order), wavelength, "rays") for order in orders])
 
     def field(self, wavelength: float, step: float = 0.0) -> ComplexArray:
         """Field on the CCD.
@@ -152,22 +193,27 @@ class Bench:
         turns = np.exp(1j * step * np.arange(len(fields)))
         return np.asarray(np.tensordot(turns, fields, axes=1), dtype=np.complex128)
 
-    def interferogram(self, wavelength: float, *, modulus: bool = False) -> FloatArray:
+    def interferogram(self, wavelength: float, *, modulus: bool = False, step: float = 0.0) -> FloatArray:
         """What the CCD records.
 
         Parameters
         ----------
         wavelength : float, metres
         modulus : bool
-            |E| instead of the irradiance |E|^2.
+            Root of the irradiance, |E|, instead of the irradiance |E|^2.
+        step : float, radians
+            Phase added to the reference at each visit to its mirror.
 
         Returns
         -------
         (rows, columns) float64
             1 where a beam of unit irradiance would fall straight on the CCD.
         """
-        modulus_of_field = np.abs(self.field(wavelength))
-        return np.asarray(modulus_of_field if modulus else modulus_of_field**2, dtype=np.float64)
+        mutual = self.mutual(wavelength)
+        turns = np.exp(1j * step * np.arange(len(mutual)))
+        # what rounding leaves of a dark pixel may be negative
+        light = np.maximum(np.einsum("m,n,mnij->ij", turns, turns.conj(), mutual).real, 0.0)
+        return np.asarray(np.sqrt(light) if modulus else light, dtype=np.float64)
 
     def phase_steps(self, wavelength: float, steps: int = 4) -> FloatArray:
         """Frames of a phase-stepped recording: frame k adds 2 pi k / steps to the reference.
@@ -190,7 +236,7 @@ class Bench:
         if steps < 3:
             raise ValueError(f"phase steps: expected at least 3, got {steps}")
         shifts = 2.0 * math.pi * np.arange(steps) / steps
-        return np.stack([np.abs(self.field(wavelength, shift)) ** 2 for shift in shifts])
+        return np.stack([self.interferogram(wavelength, step=shift) for shift in shifts])
 
     def carrier(self, wavelength: float) -> FloatArray:
         """Phase of the tilted reference wave over the pixels, 0 at the centre of the image.
@@ -225,7 +271,8 @@ class Bench:
             Carrier included; NaN where either arm brings no light.
         """
         frames = self.phase_steps(wavelength, steps)
-        lit = (self.fields(wavelength)[:2] != 0.0).all(axis=0)
+        mutual = self.mutual(wavelength)
+        lit = (mutual[0, 0] != 0.0) & (mutual[1, 1] != 0.0)
         return np.where(lit, phase.n_bucket(frames), np.nan)
 
     def height(self, wavelength: float, steps: int = 4) -> FloatArray:

@@ -1,20 +1,57 @@
-"""From arrivals to the complex field on the pixels."""
+"""From arrivals to light on the pixels: complex fields, irradiance, mutual intensity."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import chain
 
 import numpy as np
+import numpy.typing as npt
 
 from fringetrace.paths import Paths, join, screen
+from fringetrace.quadrature import mutual_products
+from fringetrace.scene import Beam
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
+
+# A wavefront is worth its while where so many rays of the beam share a facet, or facets are so few.
+SHARING, FEW = 16, 64
+
+
+def method_for(paths: Paths) -> str:
+    """The method that "auto" stands for.
+
+    "wavefront" for a `Beam` whose rays are at least `SHARING` times as many as the flat facets of the
+    scene (coplanar triangles are one; surfaces with a form have none), or where those are `FEW`;
+    else "rays".
+
+    Parameters
+    ----------
+    paths : Paths
+
+    Returns
+    -------
+    {"wavefront", "rays"}
+    """
+    from fringetrace import regions
+
+    if not isinstance(paths.source, Beam) or paths.ccd is None:
+        return "rays"
+    most = max(FEW, int(np.prod(paths.source.shape)) // SHARING)
+    flat = [surface for surface in paths.scene.surfaces if surface.form is None]
+    if sum(len(surface.mesh.faces) for surface in flat) > most:
+        planes = regions.coplanar(paths.scene)
+        facets = [planes[i].max() + 1 for i, s in enumerate(paths.scene.surfaces) if s.form is None]
+        if sum(facets) > most:
+            return "rays"
+    return "wavefront"
 
 
 def complex_field(
     paths: Paths | Iterable[Paths],
     wavelength: float,
-    method: str = "rays",
+    method: str = "auto",
     half_wave_loss: bool = True,
+    groups: npt.ArrayLike | None = None,
 ) -> ComplexArray:
     """Complex field on the pixels of the CCD.
 
@@ -24,64 +61,92 @@ def complex_field(
         From `trace`, or chunk by chunk from `stream`.
     wavelength : float, metres
         Vacuum wavelength. Another wavelength needs no new trace.
-    method : {"rays", "wavefront"}
+    method : {"auto", "wavefront", "rays"}
+        "wavefront": neighbouring rays of a `Beam` with the same path span a sheet, whose mean field
+        over each pixel is found; overlapping sheets add. See `irradiance`.
         "rays": the coherent sum E = sum of a exp(2 pi i OPL / wavelength) over the rays that fall
         in a pixel, each weighted with its beam area over the pixel's, so that a unit beam falling
         straight on the CCD gives |E|^2 = 1. Rays without an area have weight 1.
-        "wavefront": neighbouring rays of a `Beam` with the same path span a sheet, whose mean field
-        over each pixel is found; overlapping sheets add. See `irradiance`.
+        "auto": the wavefront where it is worth its while, see `method_for`.
     half_wave_loss : bool
         False leaves out the factor -1 of each reflection off a mirror.
+    groups : (paths,) int, optional
+        A field for each group of paths, from 0 on; with "wavefront", paths of one key are of one group.
 
     Returns
     -------
-    (rows, columns) complex128
-        The sum runs in the order of the rays: the same bits for any chunk size.
+    (rows, columns) complex128, or (groups, rows, columns)
+        A ray sum runs in the order of the rays: the same bits for any chunk size.
 
     Raises
     ------
     ValueError
         For a wavelength that is none, an unknown method, paths without a CCD, or no paths at all;
-        with "wavefront", for paths that are not of a beam.
+        with "wavefront", for paths that are not of a beam; for groups that do not fit the paths.
     """
-    from fringetrace import kernels
-
-    period = checked_wavelength(wavelength)
+    wavelength = checked_wavelength(wavelength)
+    method, parts = _method(paths, method)
+    if groups is None:
+        if method == "wavefront":
+            return _wavefront(parts, wavelength, None, True, half_wave_loss)[0][0]
+        return _sum(parts, wavelength, half_wave_loss)
+    whole = join(list(parts))
+    number = _numbers(whole, groups)
     if method == "wavefront":
-        return _wavefront(paths, wavelength, True, half_wave_loss)[0]
-    if method != "rays":
-        raise ValueError(f"method: expected 'rays' or 'wavefront', got {method!r}")
-    total: ComplexArray | None = None
-    for part in (paths,) if isinstance(paths, Paths) else paths:
-        if part.ccd is None:
-            raise ValueError("complex_field: expected paths traced onto a CCD, got paths without one")
-        if total is None:
-            total = np.zeros(part.ccd.shape, dtype=np.complex128)
-        weight = 1.0 if part.area is None else part.area / part.ccd.pitch**2
-        kernels.gather(
-            part.fate, part.origin, part.length, part.amplitude, part.reflections, half_wave_loss,
-            screen(part.ccd), part.ccd.pitch, weight, period, total,
-        )  # fmt: skip
-    if total is None:
-        raise ValueError("complex_field: expected at least one Paths, got none")
-    return total
+        return _wavefront([whole], wavelength, number, True, half_wave_loss)[0]
+    each = range(int(number.max(initial=0)) + 1)
+    return np.stack([_sum([whole.where(number == g)], wavelength, half_wave_loss) for g in each])
 
 
-def irradiance(paths: Paths | Iterable[Paths], wavelength: float, half_wave_loss: bool = True) -> FloatArray:
-    """Irradiance averaged over each pixel of the CCD, from the sheets of a coherent beam.
+def mutual_intensity(
+    paths: Paths | Iterable[Paths],
+    wavelength: float,
+    groups: npt.ArrayLike,
+    method: str = "auto",
+    half_wave_loss: bool = True,
+) -> ComplexArray:
+    """Mean over each pixel of E_m conj(E_n), for the fields of groups of paths.
+
+    What a camera sees of groups whose phases are stepped by d_m is the sum of J_mn exp(i (d_m - d_n)).
+
+    Parameters
+    ----------
+    paths, wavelength, method, half_wave_loss
+        As in `complex_field`.
+    groups : (paths,) int
+        The group of each path, from 0 on; with "wavefront", paths of one key are of one group.
+
+    Returns
+    -------
+    (groups, groups, rows, columns) complex128
+        Hermitian; irradiances on the diagonal. With "rays" a pixel has no inside: E_m conj(E_n).
+
+    Raises
+    ------
+    ValueError
+        As in `complex_field`.
+    """
+    wavelength = checked_wavelength(wavelength)
+    method, parts = _method(paths, method)
+    whole = join(list(parts))
+    number = _numbers(whole, groups)
+    if method == "wavefront":
+        return _wavefront([whole], wavelength, number, False, half_wave_loss)[1]
+    return mutual_products(complex_field(whole, wavelength, method, half_wave_loss, number))
+
+
+def irradiance(
+    paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto", half_wave_loss: bool = True
+) -> FloatArray:
+    """Irradiance averaged over each pixel of the CCD.
 
     Overlapping sheets add before the square is taken, at as many points of each pixel as their
     fringes ask for: the mean of |E|^2, not the square of the mean field.
 
     Parameters
     ----------
-    paths : Paths, or an iterable of them
-        Of one `Beam`, from `trace`, or chunk by chunk from `stream`. Beams that are not coherent
-        with each other have irradiances that add.
-    wavelength : float, metres
-        Vacuum wavelength. Another wavelength needs no new trace.
-    half_wave_loss : bool
-        False leaves out the factor -1 of each reflection off a mirror.
+    paths, wavelength, method, half_wave_loss
+        As in `complex_field`. Beams that are not coherent with each other have irradiances that add.
 
     Returns
     -------
@@ -91,21 +156,69 @@ def irradiance(paths: Paths | Iterable[Paths], wavelength: float, half_wave_loss
     Raises
     ------
     ValueError
-        For a wavelength that is none, paths without a CCD or not of a beam, or no paths at all.
+        As in `complex_field`.
     """
-    return _wavefront(paths, wavelength, False, half_wave_loss)[1]
+    wavelength = checked_wavelength(wavelength)
+    method, parts = _method(paths, method)
+    if method == "wavefront":
+        mutual = _wavefront(parts, wavelength, None, False, half_wave_loss)[1]
+        return np.ascontiguousarray(mutual[0, 0].real)
+    return np.asarray(np.abs(_sum(parts, wavelength, half_wave_loss)) ** 2, dtype=np.float64)
+
+
+def _method(paths: Paths | Iterable[Paths], method: str) -> tuple[str, Iterable[Paths]]:
+    """The method, "auto" resolved, and the paths in parts, of which there is at least one."""
+    if method not in ("auto", "wavefront", "rays"):
+        raise ValueError(f"method: expected 'auto', 'wavefront' or 'rays', got {method!r}")
+    rest = iter((paths,) if isinstance(paths, Paths) else paths)
+    first = next(rest, None)
+    if first is None:
+        raise ValueError("field: expected at least one Paths, got none")
+    if first.ccd is None:
+        raise ValueError("field: expected paths traced onto a CCD, got paths without one")
+    return method_for(first) if method == "auto" else method, chain([first], rest)
+
+
+def _numbers(paths: Paths, groups: npt.ArrayLike) -> npt.NDArray[np.int64]:
+    number = np.asarray(groups)
+    if number.shape != (len(paths),) or not np.issubdtype(number.dtype, np.integer) or (number < 0).any():
+        raise ValueError(
+            f"groups: expected {len(paths)} whole numbers from 0 on, one a path, got {number.dtype} "
+            f"of shape {number.shape}"
+        )
+    return number.astype(np.int64)
+
+
+def _sum(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> ComplexArray:
+    """The coherent sum over rays."""
+    from fringetrace import kernels
+
+    total = np.empty((0, 0), dtype=np.complex128)
+    for part in parts:
+        assert part.ccd is not None
+        if total.size == 0:
+            total = np.zeros(part.ccd.shape, dtype=np.complex128)
+        weight = 1.0 if part.area is None else part.area / part.ccd.pitch**2
+        kernels.gather(
+            part.fate, part.origin, part.length, part.amplitude, part.reflections, half_wave_loss,
+            screen(part.ccd), part.ccd.pitch, weight, wavelength, total,
+        )  # fmt: skip
+    return total
 
 
 def _wavefront(
-    paths: Paths | Iterable[Paths], wavelength: float, carrier: bool, half_wave_loss: bool
-) -> tuple[ComplexArray, FloatArray]:
-    """Mean field and irradiance: sheets off smooth surfaces, which have no triangles, or off facets."""
+    parts: Iterable[Paths],
+    wavelength: float,
+    groups: npt.NDArray[np.int64] | None,
+    carrier: bool,
+    half_wave_loss: bool,
+) -> tuple[ComplexArray, ComplexArray]:
+    """Mean fields and their products: sheets off smooth surfaces, which have no triangles, or off facets."""
     from fringetrace import regions, sheets
 
-    parts = [paths] if isinstance(paths, Paths) else list(paths)
-    if not parts:
-        raise ValueError("wavefront: expected at least one Paths, got none")
-    whole = join(parts)
+    whole = join(list(parts))
     smooth = whole.points is not None and whole.triangle is None
     fields = sheets.fields if smooth else regions.fields
-    return fields(whole, wavelength, carrier=carrier, half_wave_loss=half_wave_loss)
+    if groups is None:
+        groups = np.zeros(len(whole), dtype=np.int64)
+    return fields(whole, wavelength, groups, carrier=carrier, half_wave_loss=half_wave_loss)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,11 @@ from fringetrace.waves import Array, ComplexArray, FloatArray
 LEAST, MOST = 2, 32
 # What the quadrature of a fringe may be off, relative to its amplitude.
 ERROR = 1e-6
+# A cosine's mean over c cycles is its centre less (2 pi c)^2 / 24 of it, to (2 pi c)^4 / 1920: up to so
+# many cycles, and so large a correction, what remains is a tenth of ERROR (light bends along two axes,
+# and more in places than a cosine does).
+GENTLE = (192.0 * ERROR) ** 0.25 / (2.0 * np.pi)
+BENT = (192.0 * ERROR) ** 0.5 / 24.0
 # Barycentric points and weights on a triangle, exact to degree 5 (Radon 1948).
 _A, _B = (6.0 - np.sqrt(15.0)) / 21.0, (6.0 + np.sqrt(15.0)) / 21.0
 TRIANGLE = np.array(
@@ -29,6 +35,8 @@ TRIANGLE = np.array(
 )
 # Samples worked on at a time: what fits into a core's cache a few times over.
 BAND = 1 << 18
+
+T = TypeVar("T")
 
 
 def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
@@ -84,28 +92,33 @@ class Samples:
     where_x: FloatArray
     where_y: FloatArray
 
-    def blank(self) -> ComplexArray:
-        """No light yet, at each point."""
-        return np.zeros(len(self.x), dtype=np.complex128)
+    def blank(self, groups: int) -> ComplexArray:
+        """No light yet: (groups, points) zeros."""
+        return np.zeros((groups, len(self.x)), dtype=np.complex128)
 
-    def means(self, field: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-        """Mean field and mean irradiance of each pixel of the band.
+    def means(self, field: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
+        """Means over each pixel of the band.
 
         Parameters
         ----------
-        field : (points,) complex128
+        field : (groups, points) complex128
 
         Returns
         -------
-        mean : (rows, columns) complex128
-        irradiance : (rows, columns) float64
+        mean : (groups, rows, columns) complex128
+        mutual : (groups, groups, rows, columns) complex128
+            See `averaged`.
         """
         from fringetrace import raster
 
-        mean = np.empty(len(self.first) - 1, dtype=np.complex128)
-        irradiance = np.empty(len(mean))
-        raster.average(self.first, self.weight, field, mean, irradiance)
-        return mean.reshape(-1, self.columns), irradiance.reshape(-1, self.columns)
+        groups, pixels = len(field), len(self.first) - 1
+        mean = np.empty((groups, pixels), dtype=np.complex128)
+        mutual = np.empty((groups, groups, pixels), dtype=np.complex128)
+        raster.average(self.first, self.weight, field, mean, mutual)
+        return mean.reshape(groups, -1, self.columns), mutual.reshape(groups, groups, -1, self.columns)
+
+
+Light = Callable[[Samples, FloatArray], ComplexArray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,37 +243,128 @@ def fringes(slope: FloatArray, carrier: bool) -> FloatArray:
         0 where there is no wave. The neighbours stand for what bends within a pixel.
     """
     spans = np.abs(slope) if carrier else slope[..., 1::2] - slope[..., ::2]
-    steepest = np.pad(np.where(np.isfinite(slope[..., 0]), spans.max(axis=-1), 0.0), 1)
-    rows, columns = slope.shape[:2]
-    around = [steepest[i : i + rows, j : j + columns] for i in range(3) for j in range(3)]
-    return np.asarray(np.max(around, axis=0), dtype=np.float64)
+    steepest = np.where(np.isfinite(slope[..., 0]), spans.max(axis=-1), 0.0)
+    return np.asarray(_around(steepest), dtype=np.float64)
 
 
 def averaged(
-    order: npt.NDArray[np.int64], light: Callable[[Samples], ComplexArray], cuts: Edges | None = None
-) -> tuple[ComplexArray, FloatArray]:
-    """Means over the pixels of a field, band by band on all cores.
+    shape: tuple[int, int], light: Light, period: float, carrier: bool, cuts: Edges | None = None
+) -> tuple[ComplexArray, ComplexArray]:
+    """Means over the pixels of the fields of some groups, and of their products.
+
+    Where light is even its value at the centre will do, with a quarter of a quarter of its curvature:
+    the mean of f over a pixel is f + (f_xx + f_yy) / 24 to fourth order (Euler and Maclaurin).
+    Elsewhere there are as many sample points as the fringes ask for.
 
     Parameters
     ----------
-    order : (rows, columns) int64
-        Gauss points along either axis of each pixel.
+    shape : (rows, columns)
     light : callable
-        The field at the points of a band.
+        The fields (groups, points) complex128 at the points of a band; it also widens `slope`, unless
+        that is empty: a row for each point, see `fringes`.
+    period : float, metres
+        Wavelength of the light.
+    carrier : bool
+        Whether the mean fields matter: else only fringes between waves are resolved.
     cuts : Edges, optional
         Edges of sheets.
 
     Returns
     -------
-    mean : (rows, columns) complex128
-    irradiance : (rows, columns) float64
-        The same bits for any number of cores.
+    mean : (groups, rows, columns) complex128
+        Meaningless where a carrier averages out, unless `carrier`.
+    mutual : (groups, groups, rows, columns) complex128
+        Means of E_m conj(E_n); on the diagonal, the irradiances. The same bits for any number of cores.
     """
+    centre, slope = _centres(shape, light)
+    product = mutual_products(centre)
+    cycles = fringes(slope, carrier) / period
+    bend = _laplacian(product) / 24.0
+    even = (cycles <= GENTLE) & ~_cut(shape, cuts) & _small(bend, product)
+    if carrier:
+        even &= _small(_laplacian(centre) / 24.0, centre)
+    order = np.where(even, 0, gauss_order(cycles))
+    mean, mutual = _sampled(order, light, cuts)
+    mean[:, even] = (centre + _laplacian(centre) / 24.0)[:, even]
+    mutual[:, :, even] = (product + bend)[:, :, even]
+    return mean, mutual
 
-    def means(band: tuple[int, int]) -> tuple[ComplexArray, FloatArray]:
+
+def mutual_products(field: ComplexArray) -> ComplexArray:
+    """E_m conj(E_n) of fields.
+
+    Parameters
+    ----------
+    field : (groups, ...) complex128
+
+    Returns
+    -------
+    (groups, groups, ...) complex128
+    """
+    return np.asarray(field[:, None] * np.conj(field[None]), dtype=np.complex128)
+
+
+def _laplacian(values: ComplexArray) -> ComplexArray:
+    """Second differences along both axes of images (..., rows, columns); 0 at the rim."""
+    result = np.zeros_like(values)
+    inner = values[..., 1:-1, 1:-1]
+    around = values[..., 2:, 1:-1] + values[..., :-2, 1:-1] + values[..., 1:-1, 2:] + values[..., 1:-1, :-2]
+    result[..., 1:-1, 1:-1] = around - 4.0 * inner
+    return result
+
+
+def _small(bend: ComplexArray, values: ComplexArray) -> npt.NDArray[np.bool_]:
+    """Where a correction (..., rows, columns) is a small part of the largest value around; not at the rim."""
+    bend, values = (np.abs(f).reshape(-1, *f.shape[-2:]).max(axis=0) for f in (bend, values))
+    small = np.zeros(values.shape, dtype=np.bool_)
+    small[1:-1, 1:-1] = (_around(bend) <= BENT * _around(values))[1:-1, 1:-1]
+    return small
+
+
+def _cut(shape: tuple[int, int], cuts: Edges | None) -> npt.NDArray[np.bool_]:
+    """Pixels that an edge crosses, and their neighbours."""
+    crossed = np.zeros(shape, dtype=np.bool_)
+    if cuts is not None:
+        crossed.ravel()[cuts.pixel] = True
+    return np.asarray(_around(crossed), dtype=np.bool_)
+
+
+def _around(values: Array) -> Array:
+    """The largest value of each pixel and its neighbours."""
+    rows, columns = values.shape
+    padded = np.pad(values, 1)
+    wide = np.maximum(np.maximum(padded[:, :columns], padded[:, 1:-1]), padded[:, 2:])
+    return np.asarray(np.maximum(np.maximum(wide[:rows], wide[1:-1]), wide[2:]))
+
+
+def _centres(shape: tuple[int, int], light: Light) -> tuple[ComplexArray, FloatArray]:
+    """Fields (groups, rows, columns) and slopes (rows, columns, 4) at the centres of the pixels."""
+    order = np.ones(shape, dtype=np.int64)
+
+    def centres(band: tuple[int, int]) -> tuple[ComplexArray, FloatArray]:
+        points = samples(order[slice(*band)], band[0])
+        slope = np.tile([np.inf, -np.inf, np.inf, -np.inf], (len(points.x), 1))
+        return light(points, slope), slope
+
+    field, slope = zip(*_each(centres, bands(order)), strict=True)
+    return np.concatenate(field, axis=1).reshape(-1, *shape), np.concatenate(slope).reshape(*shape, 4)
+
+
+def _sampled(
+    order: npt.NDArray[np.int64], light: Light, cuts: Edges | None
+) -> tuple[ComplexArray, ComplexArray]:
+    """Means over pixels from order x order points in each; 0 where there are none."""
+    none = np.empty((0, 4))
+
+    def means(band: tuple[int, int]) -> tuple[ComplexArray, ComplexArray]:
         points = samples(order[slice(*band)], band[0], cuts)
-        return points.means(light(points))
+        return points.means(light(points, none))
 
+    mean, mutual = zip(*_each(means, bands(order)), strict=True)
+    return np.concatenate(mean, axis=-2), np.concatenate(mutual, axis=-2)
+
+
+def _each(work: Callable[[tuple[int, int]], T], parts: list[tuple[int, int]]) -> list[T]:
+    """Results of all parts, in their order, worked on by all cores."""
     with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="fringetrace") as pool:
-        means_, irradiances = zip(*pool.map(means, bands(order)), strict=True)
-    return np.concatenate(means_), np.concatenate(irradiances)
+        return list(pool.map(work, parts))

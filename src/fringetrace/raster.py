@@ -233,15 +233,23 @@ def widen(slope, across, up):
 
 
 @jit
-def average(first, weight, field, mean, irradiance):
-    """Weighted mean of the field and of its squared modulus over the samples of each pixel."""
+def average(first, weight, field, mean, mutual):
+    """Weighted means over the samples of each pixel of the fields, and of E_m conj(E_n)."""
+    groups = len(field)
     for pixel in range(len(first) - 1):
-        total, power = 0.0j, 0.0
-        for k in range(first[pixel], first[pixel + 1]):
-            value = field[k]
-            total += weight[k] * value
-            power += weight[k] * (value.real * value.real + value.imag * value.imag)
-        mean[pixel], irradiance[pixel] = total, power
+        for m in range(groups):
+            total = 0.0j
+            for k in range(first[pixel], first[pixel + 1]):
+                total += weight[k] * field[m, k]
+            mean[m, pixel] = total
+            for n in range(m, groups):
+                real, imaginary = 0.0, 0.0
+                for k in range(first[pixel], first[pixel + 1]):
+                    one, other = field[m, k], field[n, k]
+                    real += weight[k] * (one.real * other.real + one.imag * other.imag)
+                    imaginary += weight[k] * (one.imag * other.real - one.real * other.imag)
+                mutual[m, n, pixel] = complex(real, imaginary)
+                mutual[n, m, pixel] = complex(real, -imaginary)
 
 
 @jit

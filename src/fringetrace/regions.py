@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.paths import Paths
-from fringetrace.quadrature import Samples, averaged, edges, fringes, gauss_order, samples
+from fringetrace.quadrature import Samples, averaged, edges
 from fringetrace.rays import launch_at
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.sheets import checked, landed
@@ -99,6 +99,8 @@ class Wave:
     Attributes
     ----------
     name : int
+    key : int
+        Of its paths.
     origin : (2,) float64, pixels
         Column and row coordinate of a ray in the plane of focus.
     matrix : (2, 2) float64
@@ -114,6 +116,7 @@ class Wave:
     """
 
     name: np.uint64
+    key: int
     origin: FloatArray
     matrix: FloatArray
     start: FloatArray
@@ -207,6 +210,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     size = np.sqrt(beam.area / ccd.pitch**2 / spread) if spread > 0.0 else 0.0
     return Wave(
         name=name,
+        key=int(paths.key[row]),
         origin=axes @ (point[0] - ccd.centre) + 0.5 * np.array(ccd.shape[::-1]),
         matrix=matrix,
         start=start,
@@ -441,22 +445,21 @@ def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64
 
 
 def fields(
-    paths: Paths, wavelength: float, *, carrier: bool, half_wave_loss: bool = True
-) -> tuple[ComplexArray, FloatArray]:
-    """Mean field and mean irradiance of each pixel, exact off flat facets but for the quadrature.
+    paths: Paths, wavelength: float, groups: npt.NDArray[np.int64], *, carrier: bool, half_wave_loss: bool
+) -> tuple[ComplexArray, ComplexArray]:
+    """Means over each pixel of the fields of groups, exact off flat facets but for the quadrature.
 
     Parameters
     ----------
     paths : Paths
         Of a `Beam`, onto a CCD; see `waves`.
-    wavelength : float, metres
-    carrier, half_wave_loss : bool
+    wavelength, groups, carrier, half_wave_loss
         As in `sheets.fields`.
 
     Returns
     -------
-    mean : (rows, columns) complex128
-    irradiance : (rows, columns) float64
+    mean : (groups, rows, columns) complex128
+    mutual : (groups, groups, rows, columns) complex128
 
     Raises
     ------
@@ -465,6 +468,8 @@ def fields(
     """
     ccd, beam = checked(paths)
     period = checked_wavelength(wavelength)
+    _, first = np.unique(paths.key, return_index=True)
+    member = dict(zip(paths.key[first].tolist(), groups[first].tolist(), strict=True))
     parts = [
         (
             wave if half_wave_loss else replace(wave, amplitude=wave.amplitude * (-1) ** wave.reflections),
@@ -472,11 +477,12 @@ def fields(
         )
         for wave, region in waves(paths)
     ]
+    count = int(groups.max(initial=0)) + 1
 
     def light(points: Samples, slope: FloatArray) -> ComplexArray:
         from fringetrace import raster
 
-        field = points.blank()
+        field = points.blank(count)
         for wave, region in parts:
             window = _window(wave, region, points)
             if window[0] < window[1] and window[2] < window[3]:
@@ -485,14 +491,10 @@ def fields(
                     np.linalg.inv(wave.matrix), wave.origin - back, wave.path - wave.gradient @ back,
                     wave.gradient, _profile(beam, wave, points), region.kind, *region.low, region.begin,
                     region.pieces, period, points.first, points.x, points.y, points.where_x, points.where_y,
-                    points.columns, field, slope, window,
+                    points.columns, field[member[wave.key]], slope, window,
                 )  # fmt: skip
         return field
 
-    rows, columns = ccd.shape
-    slope = np.tile([np.inf, -np.inf, np.inf, -np.inf], (rows * columns, 1))
-    light(samples(np.ones(ccd.shape, dtype=np.int64), 0), slope)
-    order = gauss_order(fringes(slope.reshape(rows, columns, 4), carrier) / period)
     drawn = [wave.to_pixels(region.segments).reshape(-1, 4) for wave, region in parts]
     cuts = edges(np.concatenate([np.empty((0, 4)), *drawn]), ccd.shape)
-    return averaged(order, lambda points: light(points, np.empty((0, 4))), cuts)
+    return averaged(ccd.shape, light, period, carrier, cuts)

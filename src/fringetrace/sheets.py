@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.paths import Fate, Paths
-from fringetrace.quadrature import Samples, averaged, fringes, gauss_order, samples
+from fringetrace.quadrature import Samples, averaged
 from fringetrace.scene import CCD, Beam
 from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray, checked_wavelength
@@ -40,6 +40,7 @@ class Sheet:
 
     Attributes
     ----------
+    key : int
     x, y : (rows, columns) float64, pixels
         Column and row coordinate in the CCD's plane of focus, inside the CCD or not.
     slope_x, slope_y : (rows, columns) float64, metres a pixel
@@ -52,6 +53,7 @@ class Sheet:
         Caustics passed (the KMAH index).
     """
 
+    key: int
     x: FloatArray
     y: FloatArray
     slope_x: FloatArray
@@ -173,6 +175,7 @@ def sheets(paths: Paths) -> Iterator[Sheet]:
             last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
             turns = caustics(grid(way), grid(direction), grid(last))
         yield Sheet(
+            key=int(key),
             x=grid(offset @ u) / ccd.pitch + 0.5 * ccd.shape[1],
             y=grid(offset @ v) / ccd.pitch + 0.5 * ccd.shape[0],
             slope_x=grid(direction @ u) * ccd.pitch,
@@ -357,25 +360,26 @@ def _turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int
 
 
 def fields(
-    paths: Paths, wavelength: float, *, carrier: bool, half_wave_loss: bool = True
-) -> tuple[ComplexArray, FloatArray]:
-    """Mean field and mean irradiance of each pixel, from sheets between the arrivals of a beam.
+    paths: Paths, wavelength: float, groups: npt.NDArray[np.int64], *, carrier: bool, half_wave_loss: bool
+) -> tuple[ComplexArray, ComplexArray]:
+    """Means over each pixel of the fields of groups of sheets, and of their products.
 
     Parameters
     ----------
     paths : Paths
         Of a `Beam`, onto a CCD, off smooth surfaces: one path key is one smooth wavefront.
     wavelength : float, metres
+    groups : (paths,) int64
+        The group of each path, the same for all of a key.
     carrier : bool
-        Whether the mean field matters: then pixels are sampled for the whole slope of the phase;
-        otherwise for the differences between the sheets that overlap.
+        Whether the mean fields matter, see `quadrature.averaged`.
     half_wave_loss : bool
         False leaves out the factor -1 of each reflection off a mirror.
 
     Returns
     -------
-    mean : (rows, columns) complex128
-    irradiance : (rows, columns) float64
+    mean : (groups, rows, columns) complex128
+    mutual : (groups, groups, rows, columns) complex128
 
     Raises
     ------
@@ -386,24 +390,22 @@ def fields(
     period = checked_wavelength(wavelength)
     if not half_wave_loss:
         paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
-    parts = [(cells(sheet, ccd), sheet.base) for sheet in sheets(paths)]
-    unit = beam.area / ccd.pitch**2
+    _, first = np.unique(paths.key, return_index=True)
+    member = dict(zip(paths.key[first].tolist(), groups[first].tolist(), strict=True))
+    parts = [(cells(sheet, ccd), sheet.base, member[sheet.key]) for sheet in sheets(paths)]
+    unit, count = beam.area / ccd.pitch**2, int(groups.max(initial=0)) + 1
 
     def light(points: Samples, slope: FloatArray) -> ComplexArray:
         from fringetrace import raster
 
-        total = points.blank()
-        for part, base in parts:
-            field = points.blank()
+        total = points.blank(count)
+        for part, base, group in parts:
+            field = points.blank(1)[0]
             raster.spread(
                 part.leaves, part.coefficients, part.folded, part.turns, unit, period, points.top,
                 points.columns, points.first, points.x, points.y, field, slope,
             )  # fmt: skip
-            total += field * np.exp(2j * np.pi * np.fmod(base, period) / period)
+            total[group] += field * np.exp(2j * np.pi * np.fmod(base, period) / period)
         return total
 
-    rows, columns = ccd.shape
-    slope = np.tile([np.inf, -np.inf, np.inf, -np.inf], (rows * columns, 1))
-    light(samples(np.ones(ccd.shape, dtype=np.int64), 0), slope)
-    order = gauss_order(fringes(slope.reshape(rows, columns, 4), carrier) / period)
-    return averaged(order, lambda points: light(points, np.empty((0, 4))))
+    return averaged(ccd.shape, light, period, carrier)
