@@ -12,11 +12,14 @@ from hypothesis import strategies as st
 import fringetrace as ft
 from fringetrace import instruments, mm, nm
 from fringetrace.bench import Bench, centred, path_slope, pixel_centres
+from fringetrace.quadrature import mutual_products
 from fringetrace.shapes import plate
 
 HENE = 632.8 * nm
 # Path lengths of some 50 mm in float64, in radians at this wavelength, with room for a few roundings.
 PHASE = 1e-8
+# What the quadrature of a pixel may leave, radians.
+QUADRATURE = 1e-6
 
 
 @pytest.fixture
@@ -24,6 +27,12 @@ def bench():
     return instruments.michelson(
         plate(8 * mm, 8 * mm), aperture=6 * mm, pixels=(6, 8), reference_tilt=(2e-4, -1e-4)
     )
+
+
+@pytest.fixture
+def rays(bench):
+    """The same, its light a ray sum."""
+    return replace(bench, method="rays")
 
 
 def test_it_is_traced_once(bench):
@@ -34,7 +43,8 @@ def test_it_is_traced_once(bench):
     assert len(done) == 1
 
 
-def test_the_fields_of_the_arms_add_up_to_the_field(bench):
+def test_the_fields_of_the_arms_add_up_to_the_field(rays):
+    bench = rays
     sample, reference = bench.fields(HENE)
     np.testing.assert_allclose(abs(sample), 0.5, rtol=1e-12)
     np.testing.assert_allclose(abs(reference), 0.5, rtol=1e-12)
@@ -42,6 +52,22 @@ def test_the_fields_of_the_arms_add_up_to_the_field(bench):
     np.testing.assert_allclose(bench.field(HENE, math.pi / 3), sample + np.exp(1j * math.pi / 3) * reference)
     np.testing.assert_allclose(bench.interferogram(HENE), abs(sample + reference) ** 2, rtol=1e-12)
     np.testing.assert_allclose(bench.interferogram(HENE, modulus=True), abs(sample + reference), rtol=1e-12)
+
+
+def test_fringes_lose_their_visibility_over_a_pixel(bench):
+    """A fringe of period P over pixels of p: sinc(p_x / P_x) sinc(p_y / P_y)."""
+    mutual = bench.mutual(HENE)
+    slope = np.array(path_slope(bench.tilt))
+    visibility = np.prod(np.sinc(slope * bench.ccd.pitch / HENE))
+    # the tilted wave reaches all but the image's rim
+    inner = (slice(None), slice(None), slice(1, -1), slice(1, -1))
+    bright = math.cos(2 * math.hypot(*bench.tilt))
+    np.testing.assert_allclose(mutual[inner][0, 0], 0.25, rtol=QUADRATURE)
+    np.testing.assert_allclose(mutual[inner][1, 1], 0.25 * bright, rtol=QUADRATURE)
+    np.testing.assert_allclose(abs(mutual[inner][0, 1]), 0.25 * math.sqrt(bright) * visibility, rtol=1e-5)
+    frames = bench.phase_steps(HENE)
+    modulation = 0.5 * np.hypot(frames[0] - frames[2], frames[1] - frames[3])[1:-1, 1:-1]
+    np.testing.assert_allclose(modulation, 2 * abs(mutual[inner][0, 1]), rtol=QUADRATURE)
 
 
 def test_fields_are_kept_for_the_last_wavelength(bench):
@@ -52,9 +78,9 @@ def test_fields_are_kept_for_the_last_wavelength(bench):
 
 
 @pytest.mark.parametrize("threads", [1, 2])
-def test_streamed_fields_are_the_same(bench, threads):
+def test_streamed_fields_are_the_same(rays, threads):
     np.testing.assert_allclose(
-        bench.stream_fields(HENE, threads=threads), bench.fields(HENE), rtol=0, atol=1e-12
+        rays.stream_fields(HENE, threads=threads), rays.fields(HENE), rtol=0, atol=1e-12
     )
 
 
@@ -67,8 +93,9 @@ def test_streamed_fields_keep_no_paths(bench):
 
 def test_light_that_meets_the_reference_twice_is_stepped_twice(bench):
     orders = np.array([1.0, 2.0, 0.5])[:, None, None] * np.ones((3, *bench.ccd.shape))
-    bench.derived.update(wavelength=HENE, fields=orders)
+    bench.derived["light"] = {(HENE, "fields"): orders, (HENE, "mutual"): mutual_products(orders)}
     np.testing.assert_allclose(bench.field(HENE, math.pi / 2), 1.0 + 2.0j - 0.5)
+    np.testing.assert_allclose(bench.interferogram(HENE, step=math.pi / 2), 0.5**2 + 2.0**2)
 
 
 @pytest.mark.parametrize("steps", [0, 2])
@@ -92,13 +119,13 @@ def test_a_height_needs_light_from_both_arms():
 
 def test_the_carrier_is_the_phase_of_a_flat_sample(bench):
     flat = ft.phase.wrap(bench.wrapped(HENE) - bench.carrier(HENE))
-    np.testing.assert_allclose(flat, 0.0, atol=PHASE)
+    np.testing.assert_allclose(flat, 0.0, atol=QUADRATURE)
     np.testing.assert_allclose(bench.carrier(HENE)[[0, -1], [0, -1]].sum(), 0.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("steps", [3, 4, 5, 8])
 def test_any_number_of_steps_gives_the_same_height(bench, steps):
-    np.testing.assert_allclose(bench.height(HENE, steps), 0.0, atol=PHASE * HENE)
+    np.testing.assert_allclose(bench.height(HENE, steps), 0.0, atol=QUADRATURE * HENE)
 
 
 def test_it_survives_a_pickle_without_its_paths(bench):

@@ -44,12 +44,17 @@ def test_a_step_of_over_a_quarter_wave_is_named_and_left_out():
     """300 nm cannot be told from 300 nm - lambda/2; away from the step both sides are flat."""
     found = measured(step(8 * mm, 8 * mm, 1.06 * mm, 300 * nm))
     beyond = np.abs(found.residual) > 0.25 * HENE
-    np.testing.assert_allclose(np.abs(found.residual[beyond]), HENE / 2, rtol=1e-6)
+    # a pixel on the step shows a mean of both phases; one that the tilted beam only partly lights, at the
+    # rim, that of the lit part
+    assert np.abs(np.abs(found.residual[beyond]) - HENE / 2).max() < 0.01 * HENE
+    inner = np.zeros_like(beyond)
+    inner[1:-1, 1:-1] = found.smooth[1:-1, 1:-1]
+    np.testing.assert_allclose(np.abs(found.residual[beyond & inner]), HENE / 2, rtol=1e-6)
     assert beyond.all(axis=0).sum() == 13
     columns = np.nonzero(~found.smooth)[1]
     assert sorted(set(columns)) == [26, 27]
     assert found.rms() > 100 * nm
-    assert found.rms(~beyond) < 1e-6 * HENE
+    assert found.rms(~beyond & inner) < 1e-6 * HENE
 
 
 def test_the_rms_is_that_of_the_residual(bumpy):

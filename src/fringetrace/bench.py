@@ -149,7 +149,7 @@ class Bench:
         progress: Callable[[int, int], None] | None = None,
         threads: int | None = None,
     ) -> ComplexArray:
-        """`fields`, summed while tracing: no path is kept, so memory does not grow with the rays.
+        """`fields` by ray sum, while tracing: no path is kept, so memory does not grow with the rays.
 
         Parameters
         ----------

@@ -88,7 +88,7 @@ def complex_field(
     method, parts = _method(paths, method)
     if groups is None:
         if method == "wavefront":
-            return _wavefront(parts, wavelength, None, True, half_wave_loss)[0][0]
+            return np.ascontiguousarray(_wavefront(parts, wavelength, None, True, half_wave_loss)[0][0])
         return _sum(parts, wavelength, half_wave_loss)
     whole = join(list(parts))
     number = _numbers(whole, groups)

@@ -39,6 +39,7 @@ def michelson(
     splitter: Interface = BeamSplitter(),  # noqa: B008 - frozen
     mirror: Interface = Mirror(),  # noqa: B008 - frozen
     focus: bool = True,
+    method: str = "auto",
 ) -> Bench:
     """A Michelson (Twyman-Green) interferometer with the sample in one arm.
 
@@ -70,6 +71,8 @@ def michelson(
         Of the splitter and of the reference mirror.
     focus : bool
         The CCD sees the plane z = 0 of the sample through an ideal 1:1 relay; False: bare CCD.
+    method : {"auto", "wavefront", "rays"}
+        How arrivals become light on the pixels, see `complex_field`.
 
     Returns
     -------
@@ -105,7 +108,7 @@ def michelson(
         centre=arm * z, normal=-z, up=y, pitch=aperture / columns, shape=(rows, columns),
         focus=2.0 * arm if focus else 0.0,
     )  # fmt: skip
-    return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt)
+    return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt, method=method)
 
 
 def _layout(
