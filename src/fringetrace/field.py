@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fringetrace.paths import Paths, join, screen
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
+
+if TYPE_CHECKING:
+    from fringetrace.regions import Region, Wave
+    from fringetrace.sheets import Cells
 
 
 def complex_field(
@@ -99,13 +105,52 @@ def irradiance(paths: Paths | Iterable[Paths], wavelength: float, half_wave_loss
 def _wavefront(
     paths: Paths | Iterable[Paths], wavelength: float, carrier: bool, half_wave_loss: bool
 ) -> tuple[ComplexArray, FloatArray]:
-    """Mean field and irradiance: sheets off smooth surfaces, which have no triangles, or off facets."""
+    """Mean field and mean irradiance of each pixel, from plane waves off facets and from curved sheets.
+
+    `carrier` tells whether the mean field matters: then pixels are sampled for the whole slope of the
+    phase; otherwise for the differences between the sheets that overlap.
+    """
     from fringetrace import regions, sheets
+    from fringetrace.quadrature import Samples, averaged, edges, fringes, gauss_order, samples
 
     parts = [paths] if isinstance(paths, Paths) else list(paths)
     if not parts:
         raise ValueError("wavefront: expected at least one Paths, got none")
     whole = join(parts)
-    smooth = whole.points is not None and whole.triangle is None
-    fields = sheets.fields if smooth else regions.fields
-    return fields(whole, wavelength, carrier=carrier, half_wave_loss=half_wave_loss)
+    ccd, beam = sheets.checked(whole)
+    period = checked_wavelength(wavelength)
+    if not half_wave_loss:
+        loss = 1.0 - 2.0 * (whole.reflections % 2)
+        whole = replace(whole, amplitude=whole.amplitude * loss)
+    plane, curved, segments = _sheets(whole, half_wave_loss)
+    unit = beam.area / ccd.pitch**2
+
+    def light(points: Samples, slope: FloatArray) -> ComplexArray:
+        field = points.blank()
+        for wave, region in plane:
+            regions.spread(wave, region, beam, period, points, field, slope)
+        for sheet in curved:
+            sheets.spread(sheet, unit, period, points, field, slope)
+        return field
+
+    rows, columns = ccd.shape
+    slope = np.tile([np.inf, -np.inf, np.inf, -np.inf], (rows * columns, 1))
+    light(samples(np.ones(ccd.shape, dtype=np.int64), 0), slope)
+    order = gauss_order(fringes(slope.reshape(rows, columns, 4), carrier) / period)
+    return averaged(order, lambda points: light(points, np.empty((0, 4))), edges(segments, ccd.shape))
+
+
+def _sheets(
+    paths: Paths, half_wave_loss: bool
+) -> tuple[list[tuple[Wave, Region]], list[Cells], FloatArray]:
+    """Plane waves, curved sheets, and the edges of both on the pixels."""
+    from fringetrace import probes, regions, rims, sheets
+
+    ccd, _ = sheets.checked(paths)
+    if paths.points is not None and paths.triangle is None:  # arrivals that no facet stands for
+        return [], [sheets.cells(sheet, ccd) for sheet in sheets.sheets(paths)], np.empty((0, 4))
+    survey = probes.survey(paths, half_wave_loss)
+    plane = list(regions.waves(survey))
+    drawn = [wave.to_pixels(region.segments).reshape(-1, 4) for wave, region in plane]
+    curved, rim = rims.curved(survey)
+    return plane, curved, np.concatenate([rim, *drawn])
