@@ -152,7 +152,7 @@ def places(pieces: Pieces, owner: Array, count: int) -> tuple[FloatArray, FloatA
         Corners of the box around what is lit.
     """
     piece, axis, along, bottom, top = _trapezoids(pieces)
-    order = np.argsort(owner[piece], kind="stable")
+    order = np.lexsort((along[:, 0], axis, owner[piece]))  # side by side: no pattern of theirs
     axis, along, bottom, top = axis[order], along[order], bottom[order], top[order]
     unit = owner[piece][order]
     area = 0.5 * (along[:, 1] - along[:, 0]) * (top - bottom).sum(axis=1)

@@ -10,8 +10,12 @@ import numpy.typing as npt
 from fringetrace.probes import Probe
 from fringetrace.waves import Array, FloatArray
 
-# A side is halved this often to find where an edge crosses it: to 2e-10 of a cell.
-HALVINGS = 32
+# Where an edge crosses a side is found to this part of a cell,
+FINE = 2.5e-10
+# and where it crosses a cell, to this part of what it may be off.
+FINER = 0.05
+# Rays sent at a time in search of edges, and along a line: a trace of fewer takes as long.
+RAYS, MOST = 1024, 63
 # An edge may be off by this many pixels over a pixel's length: the area of a pixel that it mistakes.
 PIXEL = 1e-4
 # Known in cells: no better than this part of one, which single rays tell, no worse than that.
@@ -98,12 +102,17 @@ class Squares:
         return Squares(*(column[rows] for column in columns), self.size)
 
 
-def _halved(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, steps: int) -> FloatArray:
-    """Where between lit and dark points (n, 2) the light ends."""
-    for _ in range(steps if len(bright) else 0):
-        middle = 0.5 * (bright + dark)
-        lit = probe.lit(middle, names)[:, None]
-        bright, dark = np.where(lit, middle, bright), np.where(lit, dark, middle)
+def _ends(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, goal: float) -> FloatArray:
+    """Where between lit and dark points (n, 2) the light ends, to a part `goal` of their distance."""
+    width, rows = 1.0, np.arange(len(bright))
+    while len(rows) and width > goal:
+        count = int(np.clip(RAYS // len(rows), 1, MOST))
+        f = np.arange(count + 2)[:, None] / (count + 1)
+        at = bright[:, None] * (1.0 - f) + dark[:, None] * f
+        lit = probe.lit(at[:, 1:-1].reshape(-1, 2), np.repeat(names, count)).reshape(-1, count)
+        last = np.argmin(np.column_stack([lit, np.zeros(len(lit), dtype=np.bool_)]), axis=1)
+        bright, dark = at[rows, last], at[rows, last + 1]
+        width /= count + 1
     return 0.5 * (bright + dark)
 
 
@@ -112,8 +121,7 @@ def _crossings(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array,
     # neighbouring cells of a wave share their side
     bits = np.column_stack([np.column_stack([bright, dark]).view(np.int64), names.view(np.int64)])
     _, first, again = np.unique(bits, axis=0, return_index=True, return_inverse=True)
-    steps = HALVINGS + round(np.log2(size))
-    found = _halved(probe, bright[first], dark[first], names[first], steps)
+    found = _ends(probe, bright[first], dark[first], names[first], FINE / size)
     return np.asarray(found[again.ravel()], dtype=np.float64)
 
 
@@ -147,10 +155,10 @@ def _straight(
         left *= (off + np.abs(left) @ probe.fuzz)[:, None]
     straight = np.ones(len(chord), dtype=np.bool_)
     look = np.flatnonzero(length > SHORT * size)
-    for f in ALONG:
-        point = chord[look, 0] + f * along[look]
-        straight[look] &= probe.lit(point + left[look], names[look])
-        straight[look] &= ~probe.lit(point - left[look], names[look])
+    point = chord[look, None, 0] + np.array(ALONG)[:, None] * along[look, None]
+    both = np.stack([point + left[look, None], point - left[look, None]], axis=1)
+    lit = probe.lit(both.reshape(-1, 2), np.repeat(names[look], 2 * len(ALONG))).reshape(-1, 2, len(ALONG))
+    straight[look] = lit[:, 0].all(axis=1) & ~lit[:, 1].any(axis=1)
     return straight
 
 
@@ -170,12 +178,13 @@ def _middles(
     step = np.zeros_like(along)
     step[rows, across] = 0.5 * length * np.where(along[rows, axis] > 0.0, 1.0, -1.0) * np.where(axis, -1, 1)
     middle = chord.mean(axis=1)
-    bright, dark = (
-        np.clip(middle + side * step, squares.low, squares.low + squares.size) for side in (1.0, -1.0)
-    )
-    there = probe.lit(bright, names) & ~probe.lit(dark, names)
-    steps = HALVINGS + round(np.log2(squares.size)) + int(np.ceil(np.log2(max(length.max(initial=0), 1e-6))))
-    middle[there] = _halved(probe, bright[there], dark[there], names[there], steps)
+    ends = np.stack([middle + step, middle - step])
+    bright, dark = ends = np.clip(ends, squares.low, squares.low + squares.size)
+    lit, unlit = probe.lit(ends.reshape(-1, 2), np.tile(names, 2)).reshape(2, -1)
+    there = lit & ~unlit
+    off = np.clip(PIXEL / squares.scale, STRAIGHT, COARSE)
+    goal = max(FINER * float((off / np.maximum(length, off)).min(initial=1.0)), FINE)
+    middle[there] = _ends(probe, bright[there], dark[there], names[there], goal)
     return middle, there
 
 
