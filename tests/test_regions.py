@@ -9,7 +9,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import fringetrace as ft
-from fringetrace import instruments, mm, nm, regions, shapes
+from fringetrace import instruments, mm, nm, outlines, probes, regions, shapes
 from fringetrace.rays import launch, launch_at
 from fringetrace.vectors import rotation
 
@@ -32,7 +32,7 @@ def flux(paths):
 
 def test_triangles_of_one_plane_have_one_number():
     mesh = shapes.staircase(3 * mm, 2 * mm, 3, 70 * nm).moved((1e-3, 0, 2e-3), rotation((1, 2, 3), 0.7))
-    (planes,) = regions.coplanar(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
+    (planes,) = probes.parted(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
     assert (planes[::2] == planes[1::2]).all()
     assert len(np.unique(planes)) == 5
 
@@ -80,16 +80,16 @@ def test_a_mirror_off_the_camera_brings_nothing():
 
 def test_a_corner_inside_a_cell_is_found_by_quartering():
     mesh = shapes.plate(1.07 * mm, 1.07 * mm).moved((0.4 * mm, 0.4 * mm, 0))
-    ((wave, region),) = regions.waves(lit(mesh, (5, 5)))
+    ((wave, region),) = regions.waves(probes.survey(lit(mesh, (5, 5))))
     assert abs(wave.amplitude) == pytest.approx(1.0, rel=ROUNDING)
-    assert region.pieces[:, 2].min() == 0.5**regions.DEPTH
+    assert region.pieces[:, 2].min() == 0.5**outlines.DEPTH
     # each quartering of the four corners leaves a few pieces, not all of the edge
-    assert len(region.pieces) < 4 * 4 * (regions.DEPTH + 2)
+    assert len(region.pieces) < 4 * 4 * (outlines.DEPTH + 2)
 
 
 def test_a_straight_edge_costs_one_piece_a_cell():
     step = shapes.step(9 * mm, 9 * mm, 0.1 * mm, 80 * nm).moved(turn=rotation((0, 0, 1), 0.4))
-    found = list(regions.waves(lit(step)))
+    found = list(regions.waves(probes.survey(lit(step))))
     assert len(found) == 2
     for _, region in found:
         assert (region.pieces[:, 2] == 1.0).all()

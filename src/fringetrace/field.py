@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from itertools import chain
+from itertools import chain, groupby
 
 import numpy as np
 import numpy.typing as npt
@@ -32,15 +32,15 @@ def method_for(paths: Paths) -> str:
     -------
     {"wavefront", "rays"}
     """
-    from fringetrace import regions
+    from fringetrace.probes import parted
 
     if not isinstance(paths.source, Beam) or paths.ccd is None:
         return "rays"
     most = max(FEW, int(np.prod(paths.source.shape)) // SHARING)
     flat = [surface for surface in paths.scene.surfaces if surface.form is None]
     if sum(len(surface.mesh.faces) for surface in flat) > most:
-        planes = regions.coplanar(paths.scene)
-        facets = [planes[i].max() + 1 for i, s in enumerate(paths.scene.surfaces) if s.form is None]
+        parts = parted(paths.scene)
+        facets = [parts[i].max() + 1 for i, s in enumerate(paths.scene.surfaces) if s.form is None]
         if sum(facets) > most:
             return "rays"
     return "wavefront"
@@ -58,7 +58,7 @@ def complex_field(
     Parameters
     ----------
     paths : Paths, or an iterable of them
-        From `trace`, or chunk by chunk from `stream`.
+        From `trace`, or chunk by chunk from `stream`; of several coherent beams, one after the other.
     wavelength : float, metres
         Vacuum wavelength. Another wavelength needs no new trace.
     method : {"auto", "wavefront", "rays"}
@@ -86,16 +86,18 @@ def complex_field(
     """
     wavelength = checked_wavelength(wavelength)
     method, parts = _method(paths, method)
-    if groups is None:
-        if method == "wavefront":
-            return np.ascontiguousarray(_wavefront(parts, wavelength, None, True, half_wave_loss)[0][0])
-        return _sum(parts, wavelength, half_wave_loss)
-    whole = join(list(parts))
-    number = _numbers(whole, groups)
     if method == "wavefront":
-        return _wavefront([whole], wavelength, number, True, half_wave_loss)[0]
-    each = range(int(number.max(initial=0)) + 1)
-    return np.stack([_sum([whole.where(number == g)], wavelength, half_wave_loss) for g in each])
+        mean = _wavefront(parts, wavelength, groups, True, half_wave_loss)[0]
+        return mean if groups is not None else np.ascontiguousarray(mean[0])
+    if groups is None:
+        return _sum(parts, wavelength, half_wave_loss)
+    parts = list(parts)
+    numbers = _numbers(parts, groups)
+    count = max(int(number.max(initial=0)) for number in numbers) + 1
+    member = [
+        [part.where(number == g) for part, number in zip(parts, numbers, strict=True)] for g in range(count)
+    ]
+    return np.stack([_sum(group, wavelength, half_wave_loss) for group in member])
 
 
 def mutual_intensity(
@@ -128,11 +130,9 @@ def mutual_intensity(
     """
     wavelength = checked_wavelength(wavelength)
     method, parts = _method(paths, method)
-    whole = join(list(parts))
-    number = _numbers(whole, groups)
     if method == "wavefront":
-        return _wavefront([whole], wavelength, number, False, half_wave_loss)[1]
-    return mutual_products(complex_field(whole, wavelength, method, half_wave_loss, number))
+        return _wavefront(parts, wavelength, groups, False, half_wave_loss)[1]
+    return mutual_products(complex_field(parts, wavelength, method, half_wave_loss, groups))
 
 
 def irradiance(
@@ -146,7 +146,7 @@ def irradiance(
     Parameters
     ----------
     paths, wavelength, method, half_wave_loss
-        As in `complex_field`. Beams that are not coherent with each other have irradiances that add.
+        As in `complex_field`. The irradiances of beams that are not coherent with each other add.
 
     Returns
     -------
@@ -179,14 +179,16 @@ def _method(paths: Paths | Iterable[Paths], method: str) -> tuple[str, Iterable[
     return method_for(first) if method == "auto" else method, chain([first], rest)
 
 
-def _numbers(paths: Paths, groups: npt.ArrayLike) -> npt.NDArray[np.int64]:
-    number = np.asarray(groups)
-    if number.shape != (len(paths),) or not np.issubdtype(number.dtype, np.integer) or (number < 0).any():
+def _numbers(parts: list[Paths], groups: npt.ArrayLike) -> list[npt.NDArray[np.int64]]:
+    """The group of each path of each part."""
+    number, ends = np.asarray(groups), np.cumsum([len(part) for part in parts])
+    whole = np.issubdtype(number.dtype, np.integer)
+    if number.shape != (ends[-1],) or not whole or (number < 0).any():
         raise ValueError(
-            f"groups: expected {len(paths)} whole numbers from 0 on, one a path, got {number.dtype} "
+            f"groups: expected {ends[-1]} whole numbers from 0 on, one a path, got {number.dtype} "
             f"of shape {number.shape}"
         )
-    return number.astype(np.int64)
+    return np.split(number.astype(np.int64), ends[:-1])
 
 
 def _sum(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> ComplexArray:
@@ -209,16 +211,23 @@ def _sum(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> Com
 def _wavefront(
     parts: Iterable[Paths],
     wavelength: float,
-    groups: npt.NDArray[np.int64] | None,
+    groups: npt.ArrayLike | None,
     carrier: bool,
     half_wave_loss: bool,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Mean fields and their products: sheets off smooth surfaces, which have no triangles, or off facets."""
-    from fringetrace import regions, sheets
+    """Mean fields of groups, and means of their products, of all beams together."""
+    from fringetrace import wavefront
 
-    whole = join(list(parts))
-    smooth = whole.points is not None and whole.triangle is None
-    fields = sheets.fields if smooth else regions.fields
+    parts = list(parts)
     if groups is None:
-        groups = np.zeros(len(whole), dtype=np.int64)
-    return fields(whole, wavelength, groups, carrier=carrier, half_wave_loss=half_wave_loss)
+        groups = np.zeros(sum(len(part) for part in parts), dtype=np.int64)
+    lights, count = [], 1
+    for _, chunks in groupby(
+        zip(parts, _numbers(parts, groups), strict=True), lambda part: id(part[0].source)
+    ):
+        some, numbers = zip(*chunks, strict=True)
+        number = np.concatenate(numbers)
+        count = max(count, int(number.max(initial=0)) + 1)
+        lights.append(wavefront.light(join(some), number, half_wave_loss))
+    assert parts[0].ccd is not None
+    return wavefront.fields(lights, count, parts[0].ccd.shape, wavelength, carrier)

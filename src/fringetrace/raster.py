@@ -278,8 +278,8 @@ def spread_flat(
 
     (s, t) = inverse (point - origin); the path at the origin is `path`, its gradient `gradient`.
     `kind` of each cell from (low_s, low_t) on: 0 dark, 1 lit, 2 in pieces, those of the cell from
-    begin[cell] on. A piece is s, t, size, and a, b, c: lit where a s + b t > c. A point belongs to
-    the region if (where_x, where_y) does. `pixels` of the band: first and last row, column.
+    begin[cell] on. A piece is s, t from, s, t to, and a, b, c: lit where a s + b t > c. A point belongs
+    to the region if (where_x, where_y) does. `pixels` of the band: first and last row, column.
     """
     rows, columns = kind.shape
     for i in range(pixels[0], pixels[1]):
@@ -297,9 +297,8 @@ def spread_flat(
                     lit = False
                     cell = row * columns + column
                     for p in range(begin[cell], begin[cell + 1]):
-                        u, v = s - pieces[p, 0], t - pieces[p, 1]
-                        if 0.0 <= u <= pieces[p, 2] and 0.0 <= v <= pieces[p, 2]:
-                            lit = pieces[p, 3] * s + pieces[p, 4] * t > pieces[p, 5]
+                        if pieces[p, 0] <= s <= pieces[p, 2] and pieces[p, 1] <= t <= pieces[p, 3]:
+                            lit = pieces[p, 4] * s + pieces[p, 5] * t > pieces[p, 6]
                             break
                     if not lit:
                         continue

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.paths import Fate, Paths
-from fringetrace.quadrature import Samples, averaged
+from fringetrace.quadrature import Samples
 from fringetrace.scene import CCD, Beam
 from fringetrace.vectors import frame
-from fringetrace.waves import Array, ComplexArray, FloatArray, checked_wavelength
+from fringetrace.waves import Array, ComplexArray, FloatArray
 
 # Stencils for a first derivative: where they begin, and their weights (Lagrange; exact to the order
 # of their length less one). The longest that fits is taken, the most central first.
@@ -40,7 +40,6 @@ class Sheet:
 
     Attributes
     ----------
-    key : int
     x, y : (rows, columns) float64, pixels
         Column and row coordinate in the CCD's plane of focus, inside the CCD or not.
     slope_x, slope_y : (rows, columns) float64, metres a pixel
@@ -53,7 +52,6 @@ class Sheet:
         Caustics passed (the KMAH index).
     """
 
-    key: int
     x: FloatArray
     y: FloatArray
     slope_x: FloatArray
@@ -153,38 +151,98 @@ def sheets(paths: Paths) -> Iterator[Sheet]:
         If the source is no beam, or there is no CCD.
     """
     ccd, beam = checked(paths)
-    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
-    rows, point, length = landed(paths, ccd)
+    rows, _, _ = landed(paths, ccd)
     keys = paths.key[rows]
     for key in np.unique(keys):
-        mine = np.flatnonzero(keys == key)
-        chosen = rows[mine]
+        yield sheet(paths, rows[keys == key], ccd, beam.shape)
 
-        def grid(values: Array, chosen: Array = chosen) -> Array:
-            blank = np.full((beam.shape[0] * beam.shape[1], *values.shape[1:]), np.nan, dtype=values.dtype)
-            blank[paths.ray[chosen]] = values
-            return blank.reshape(*beam.shape, *values.shape[1:])
 
-        offset = point[mine] - ccd.centre
-        base = float(length[mine].mean())
-        direction = paths.direction[chosen]
-        turns = np.zeros(beam.shape, dtype=np.int64)
-        if paths.points is not None:
-            bounces = int(paths.bounces[chosen[0]])
-            way = np.concatenate([paths.points[chosen, : bounces + 1], point[mine, None]], axis=1)
-            last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
-            turns = caustics(grid(way), grid(direction), grid(last))
-        yield Sheet(
-            key=int(key),
-            x=grid(offset @ u) / ccd.pitch + 0.5 * ccd.shape[1],
-            y=grid(offset @ v) / ccd.pitch + 0.5 * ccd.shape[0],
-            slope_x=grid(direction @ u) * ccd.pitch,
-            slope_y=grid(direction @ v) * ccd.pitch,
-            length=grid(length[mine] - base),
-            base=base,
-            amplitude=grid(paths.amplitude[chosen]),
-            turns=turns,
-        )
+def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
+    """Arrivals of one sequence of surfaces, put onto a grid.
+
+    Parameters
+    ----------
+    paths : Paths
+        `ray` is the number of the node of the grid.
+    rows : (n,) int64
+        Which of them; they cross the CCD's plane of focus.
+    ccd : CCD
+    shape : (rows, columns)
+
+    Returns
+    -------
+    Sheet
+    """
+    arrived = arrivals(paths, rows, ccd)
+
+    def grid(values: Array) -> Array:
+        fill = np.nan if values.dtype.kind in "fc" else 0
+        blank = np.full((shape[0] * shape[1], *values.shape[1:]), fill, dtype=values.dtype)
+        blank[paths.ray[rows]] = values
+        return blank.reshape(*shape, *values.shape[1:])
+
+    base = float(arrived.length.mean())
+    turns = np.zeros(shape, dtype=np.int64)
+    if arrived.way is not None:
+        way, direction, last = grid(arrived.way), grid(arrived.direction), grid(arrived.last)
+        turns = caustics(way, direction, last, along_grid)
+    return Sheet(
+        x=grid(arrived.x), y=grid(arrived.y), slope_x=grid(arrived.slope_x), slope_y=grid(arrived.slope_y),
+        length=grid(arrived.length - base), base=base, amplitude=grid(paths.amplitude[rows]), turns=turns,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Arrivals:
+    """Where and how (n,) paths of as many bounces arrive; as in `Sheet`, and for `caustics`.
+
+    `length` is the whole path, `way` (n, bounces + 2, 3) the points that it went through, None unless
+    recorded, `direction` (n, 3) that of its last leg, `last` that leg's length.
+    """
+
+    x: FloatArray
+    y: FloatArray
+    slope_x: FloatArray
+    slope_y: FloatArray
+    length: FloatArray
+    way: FloatArray | None
+    direction: FloatArray
+    last: FloatArray
+
+
+def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
+    """Where and how paths of as many bounces cross the CCD's plane of focus.
+
+    Parameters
+    ----------
+    paths : Paths
+    rows : (n,) int64
+        Which of them.
+    ccd : CCD
+
+    Returns
+    -------
+    Arrivals
+    """
+    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
+    chosen = paths.where(rows)
+    _, point, length = landed(chosen, ccd)
+    offset, direction = point - ccd.centre, chosen.direction
+    way, last = None, np.zeros(len(rows))
+    if chosen.points is not None:
+        bounces = int(chosen.bounces.max(initial=0))
+        way = np.concatenate([chosen.points[:, : bounces + 1], point[:, None]], axis=1)
+        last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
+    return Arrivals(
+        x=offset @ u / ccd.pitch + 0.5 * ccd.shape[1],
+        y=offset @ v / ccd.pitch + 0.5 * ccd.shape[0],
+        slope_x=direction @ u * ccd.pitch,
+        slope_y=direction @ v * ccd.pitch,
+        length=length,
+        way=way,
+        direction=direction,
+        last=last,
+    )
 
 
 def checked(paths: Paths) -> tuple[CCD, Beam]:
@@ -218,7 +276,14 @@ def _across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
     return a, np.cross(direction, a)
 
 
-def caustics(way: FloatArray, arrival: FloatArray, last: FloatArray) -> npt.NDArray[np.int64]:
+def along_grid(values: FloatArray) -> FloatArray:
+    """Derivatives (rows, columns, 2, ...) of values along the columns and the rows of a grid."""
+    return np.stack([differences(values, 1), differences(values, 0)], axis=2)
+
+
+def caustics(
+    way: FloatArray, arrival: FloatArray, last: FloatArray, slopes: Callable[[FloatArray], FloatArray]
+) -> npt.NDArray[np.int64]:
     """Caustics that each ray of a sheet has passed (KMAH index): principal wavefront curvatures count.
 
     Between two surfaces the ray tube has the cross-section det(Q0 + s Q1), where Q0 and Q1 are the
@@ -227,17 +292,19 @@ def caustics(way: FloatArray, arrival: FloatArray, last: FloatArray) -> npt.NDAr
 
     Parameters
     ----------
-    way : (rows, columns, k, 3) float64, metres
+    way : (n, m, k, 3) float64, metres
         Points of the path from its start to the plane of focus.
-    arrival : (rows, columns, 3) float64, unit
+    arrival : (n, m, 3) float64, unit
         Direction of the last segment.
-    last : (rows, columns) float64, metres
+    last : (n, m) float64, metres
         Its length; negative where the plane of focus lies behind the last surface: what the relay
         images is the wave carried back, and caustics are taken back.
+    slopes : callable
+        Derivatives (n, m, 2, 3) of values (n, m, 3) along two coordinates, such as `along_grid`.
 
     Returns
     -------
-    (rows, columns) int64
+    (n, m) int64
         0 where there is no path.
     """
     turns = np.zeros(last.shape, dtype=np.int64)
@@ -250,10 +317,11 @@ def caustics(way: FloatArray, arrival: FloatArray, last: FloatArray) -> npt.NDAr
             direction, reach = arrival, last
         across = np.stack(_across(direction), axis=-2)
         start, turned = (
-            np.einsum("...ij,...kj->...ik", across, np.stack([differences(f, 1), differences(f, 0)], axis=-2))
-            for f in (way[:, :, leg], direction)
+            np.einsum("...ij,...kj->...ik", across, slopes(f)) for f in (way[:, :, leg], direction)
         )
         known = np.isfinite(start).all(axis=(-1, -2)) & np.isfinite(turned).all(axis=(-1, -2))
+        start[~known] = np.eye(2)
+        known &= np.linalg.det(start) != 0.0
         start[~known], turned[~known] = np.eye(2), 0.0
         curvature = turned @ np.linalg.inv(start)
         principal = np.linalg.eigvalsh(0.5 * (curvature + np.swapaxes(curvature, -1, -2)))
@@ -285,24 +353,23 @@ def _interpolated(f: FloatArray) -> FloatArray:
     return _bicubic(f, along_s, differences(f, 0), differences(along_s, 0))
 
 
-def cells(sheet: Sheet, ccd: CCD) -> Cells:
-    """Hermite patches between the nodes of a sheet, and their leaves.
+def patches(sheet: Sheet) -> tuple[FloatArray, FloatArray]:
+    """Hermite patches between the nodes of a sheet.
 
     The optical path has the exact gradient, dW = p . dx; positions have tangents by differences
-    of fourth order. At the rim of the beam's grid a cell reaches on to the rim of the beam, half a
-    cell beyond the rays.
+    of fourth order.
 
     Parameters
     ----------
     sheet : Sheet
-    ccd : CCD
 
     Returns
     -------
-    Cells
+    coefficients : (rows - 1, columns - 1, 6, 4, 4) float64
+        See `raster`; NaN where a corner is missing.
+    area : (rows, columns) float64
+        The map's Jacobian at the nodes.
     """
-    from fringetrace import raster
-
     x_s, x_t = differences(sheet.x, 1), differences(sheet.x, 0)
     y_s, y_t = differences(sheet.y, 1), differences(sheet.y, 0)
     w_s = sheet.slope_x * x_s + sheet.slope_y * y_s
@@ -316,7 +383,65 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
         _interpolated(sheet.amplitude.real),
         _interpolated(sheet.amplitude.imag),
     ]
-    coefficients = np.stack(fields, axis=2)
+    return np.stack(fields, axis=2), area
+
+
+def leaved(
+    coefficients: FloatArray,
+    turns: npt.NDArray[np.int64],
+    base: float,
+    owner: npt.NDArray[np.int64],
+    domain: FloatArray,
+    lines: FloatArray,
+    ccd: CCD,
+) -> Cells:
+    """Cells and their leaves.
+
+    Parameters
+    ----------
+    coefficients : (n, 6, 4, 4) float64
+    turns : (n, 2) int64
+    base : float, metres
+    owner : (m,) int64
+        Which cells parts of them, that are lit, belong to.
+    domain : (m, 4) float64
+        Those parts: s from and to, t from and to.
+    lines : (m, 3) float64
+        a, b, c: lit where a s + b t >= c.
+    ccd : CCD
+
+    Returns
+    -------
+    Cells
+    """
+    from fringetrace import raster
+
+    leaves = raster.split(np.ascontiguousarray(coefficients[owner]), domain, lines, *ccd.shape)
+    leaves[:, raster.CELL] = owner[leaves[:, raster.CELL].astype(np.int64)]
+    folded = np.zeros(len(coefficients), dtype=np.bool_)
+    signs = np.zeros((len(coefficients), 2), dtype=np.bool_)
+    for branch, sign in enumerate((-1.0, 1.0)):
+        signs[leaves[leaves[:, raster.SIGN] == sign, raster.CELL].astype(np.int64), branch] = True
+    folded[leaves[leaves[:, raster.SIGN] == 0.0, raster.CELL].astype(np.int64)] = True
+    folded |= signs.all(axis=1)
+    return Cells(np.ascontiguousarray(coefficients), leaves, folded, turns, base)
+
+
+def cells(sheet: Sheet, ccd: CCD) -> Cells:
+    """Hermite patches between the nodes of a sheet, and their leaves.
+
+    At the rim of the beam's grid a cell reaches on to the rim of the beam, half a cell beyond the rays.
+
+    Parameters
+    ----------
+    sheet : Sheet
+    ccd : CCD
+
+    Returns
+    -------
+    Cells
+    """
+    coefficients, area = patches(sheet)
     whole = np.isfinite(coefficients).all(axis=(2, 3, 4))
     row, column = np.nonzero(whole)
     rows, columns = whole.shape
@@ -326,26 +451,19 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
             np.where(row == 0, -0.5, 0.0), np.where(row == rows - 1, 1.5, 1.0),
         ], axis=1,
     )  # fmt: skip
-    chosen = np.ascontiguousarray(coefficients[whole])
-    lines = np.tile([0.0, 0.0, -1.0], (len(chosen), 1))  # all of each cell
-    leaves = raster.split(chosen, domain, lines, *ccd.shape)
-    folded = np.zeros(len(chosen), dtype=np.bool_)
-    signs = np.zeros((len(chosen), 2), dtype=np.bool_)
-    for branch, sign in enumerate((-1.0, 1.0)):
-        signs[leaves[leaves[:, raster.SIGN] == sign, raster.CELL].astype(np.int64), branch] = True
-    folded[leaves[leaves[:, raster.SIGN] == 0.0, raster.CELL].astype(np.int64)] = True
-    folded |= signs.all(axis=1)
-    return Cells(chosen, leaves, folded, _turns(sheet.turns, area)[whole], sheet.base)
+    lines = np.tile([0.0, 0.0, -1.0], (len(domain), 1))  # all of each cell
+    turns = branch_turns(sheet.turns, area)[whole]
+    return leaved(coefficients[whole], turns, sheet.base, np.arange(len(domain)), domain, lines, ccd)
 
 
-def _largest(grid: npt.NDArray[np.int64], size: int) -> npt.NDArray[np.int64]:
+def largest(grid: Array, size: int) -> Array:
     """Largest of each size x size window of a grid."""
     rows, columns = (n - size + 1 for n in grid.shape)
     window = range(size)
     return np.asarray(np.max([grid[i : i + rows, j : j + columns] for i in window for j in window], axis=0))
 
 
-def _turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int64]:
+def branch_turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int64]:
     """Caustics passed in each cell where J < 0 and where J > 0: that of its corners of that sign.
 
     A fold that reaches into a cell, but to none of its corners, has them in the next cell.
@@ -354,58 +472,34 @@ def _turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int
     branches = []
     for sign in (-1.0, 1.0):
         known = np.where(area * sign > 0.0, turns, none)
-        corner, near = _largest(known, 2), _largest(np.pad(known, 1, constant_values=none), 4)
+        corner, near = largest(known, 2), largest(np.pad(known, 1, constant_values=none), 4)
         branches.append(np.where(corner > none, corner, np.where(near > none, near, 0)))
     return np.stack(branches, axis=-1)
 
 
-def fields(
-    paths: Paths, wavelength: float, groups: npt.NDArray[np.int64], *, carrier: bool, half_wave_loss: bool
-) -> tuple[ComplexArray, ComplexArray]:
-    """Means over each pixel of the fields of groups of sheets, and of their products.
+def spread(
+    cells: Cells, unit: float, period: float, points: Samples, field: ComplexArray, slope: FloatArray
+) -> None:
+    """Add a sheet's waves to sample points.
 
     Parameters
     ----------
-    paths : Paths
-        Of a `Beam`, onto a CCD, off smooth surfaces: one path key is one smooth wavefront.
-    wavelength : float, metres
-    groups : (paths,) int64
-        The group of each path, the same for all of a key.
-    carrier : bool
-        Whether the mean fields matter, see `quadrature.averaged`.
-    half_wave_loss : bool
-        False leaves out the factor -1 of each reflection off a mirror.
-
-    Returns
-    -------
-    mean : (groups, rows, columns) complex128
-    mutual : (groups, groups, rows, columns) complex128
-
-    Raises
-    ------
-    ValueError
-        If the source is no beam, or there is no CCD, or the wavelength is none.
+    cells : Cells
+    unit : float
+        The beam's area that a step of its grid stands for, in pixels.
+    period : float, metres
+        The wavelength.
+    points : Samples
+    field : (points,) complex128
+        Added to.
+    slope : (points, 4) float64, metres a pixel, or (0, 4)
+        Widened, see `raster.spread`.
     """
-    ccd, beam = checked(paths)
-    period = checked_wavelength(wavelength)
-    if not half_wave_loss:
-        paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
-    _, first = np.unique(paths.key, return_index=True)
-    member = dict(zip(paths.key[first].tolist(), groups[first].tolist(), strict=True))
-    parts = [(cells(sheet, ccd), sheet.base, member[sheet.key]) for sheet in sheets(paths)]
-    unit, count = beam.area / ccd.pitch**2, int(groups.max(initial=0)) + 1
+    from fringetrace import raster
 
-    def light(points: Samples, slope: FloatArray) -> ComplexArray:
-        from fringetrace import raster
-
-        total = points.blank(count)
-        for part, base, group in parts:
-            field = points.blank(1)[0]
-            raster.spread(
-                part.leaves, part.coefficients, part.folded, part.turns, unit, period, points.top,
-                points.columns, points.first, points.x, points.y, field, slope,
-            )  # fmt: skip
-            total[group] += field * np.exp(2j * np.pi * np.fmod(base, period) / period)
-        return total
-
-    return averaged(ccd.shape, light, period, carrier)
+    own = points.blank(1)[0]
+    raster.spread(
+        cells.leaves, cells.coefficients, cells.folded, cells.turns, unit, period, points.top,
+        points.columns, points.first, points.x, points.y, own, slope,
+    )  # fmt: skip
+    field += own * np.exp(2j * np.pi * np.fmod(cells.base, period) / period)

@@ -1,0 +1,321 @@
+"""Where the light of a sequence ends on the beam's grid: cells cut along edges, which rays find."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.probes import Probe
+from fringetrace.waves import Array, FloatArray
+
+# Where an edge crosses a side is found to this part of a cell,
+FINE = 2.5e-10
+# and where it crosses a cell, to this part of what it may be off.
+FINER = 0.05
+# Rays sent at a time in search of edges, and along a line: a trace of fewer takes as long.
+RAYS, MOST = 1024, 63
+# An edge may be off by this many pixels over a pixel's length: the area of a pixel that it mistakes.
+PIXEL = 1e-4
+# Known in cells: no better than this part of one, which single rays tell, no worse than that.
+STRAIGHT, COARSE = 1e-7, 1e-2
+# A chord shorter than this part of its cell is not looked at.
+SHORT = 1e-4
+# Where several edges meet, cells are quartered this often; what is left is 1e-6 of a cell's area.
+DEPTH = 10
+# A bent edge is halved this often.
+BENDS = 9
+# Chords of a bent edge are no steeper than this to its first one's axis: else it turns a corner.
+STEEP = 4.0
+# Where along a chord it is looked at.
+ALONG = (0.21, 0.5, 0.83)
+CORNERS = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Parts of cells of the beam's grid: rectangles, lit to the left of a chord.
+
+    Attributes
+    ----------
+    wave, cell : (n,) int64
+        Numbers of the sequence of surfaces and of the cell, row * columns + column.
+    low, high : (n, 2) float64
+        Corners of the rectangle, in cells (column, row).
+    chord : (n, 2, 2) float64
+        Its ends; NaN where all of the rectangle is lit.
+    """
+
+    wave: npt.NDArray[np.int64]
+    cell: npt.NDArray[np.int64]
+    low: FloatArray
+    high: FloatArray
+    chord: FloatArray
+
+    @property
+    def cut(self) -> npt.NDArray[np.bool_]:
+        """Which have a chord."""
+        return np.isfinite(self.chord[:, 0, 0])
+
+    @property
+    def whole(self) -> npt.NDArray[np.bool_]:
+        """Which are all of their cell."""
+        return ~self.cut & (self.high - self.low == 1.0).all(axis=1)
+
+    @property
+    def lines(self) -> FloatArray:
+        """(n, 3) a, b, c: lit where a s + b t >= c."""
+        begin, end = self.chord[:, 0], self.chord[:, 1]
+        a, b = begin[:, 1] - end[:, 1], end[:, 0] - begin[:, 0]
+        line = np.stack([a, b, a * begin[:, 0] + b * begin[:, 1]], axis=1)
+        return np.where(self.cut[:, None], line, (0.0, 0.0, -1.0))
+
+    def part(self, rows: Array) -> Pieces:
+        """Some of them."""
+        return Pieces(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    @staticmethod
+    def joined(parts: list[Pieces]) -> Pieces:
+        """One table of several, at least one."""
+        columns = ([getattr(part, field.name) for part in parts] for field in fields(Pieces))
+        return Pieces(*(np.concatenate(column) for column in columns))
+
+
+@dataclass(frozen=True, eq=False)
+class Squares:
+    """Cells, or parts of them, that are all of a size: `lit` (n, 4) at the corners, from (0, 0) around.
+
+    `scale` (n,) is how many pixels a cell is wide.
+    """
+
+    wave: npt.NDArray[np.int64]
+    cell: npt.NDArray[np.int64]
+    scale: FloatArray
+    low: FloatArray
+    lit: npt.NDArray[np.bool_]
+    size: float
+
+    def part(self, rows: Array) -> Squares:
+        """Some of them."""
+        columns = (self.wave, self.cell, self.scale, self.low, self.lit)
+        return Squares(*(column[rows] for column in columns), self.size)
+
+
+def _ends(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, goal: float) -> FloatArray:
+    """Where between lit and dark points (n, 2) the light ends, to a part `goal` of their distance."""
+    width, rows = 1.0, np.arange(len(bright))
+    while len(rows) and width > goal:
+        count = int(np.clip(RAYS // len(rows), 1, MOST))
+        f = np.arange(count + 2)[:, None] / (count + 1)
+        at = bright[:, None] * (1.0 - f) + dark[:, None] * f
+        lit = probe.lit(at[:, 1:-1].reshape(-1, 2), np.repeat(names, count)).reshape(-1, count)
+        last = np.argmin(np.column_stack([lit, np.zeros(len(lit), dtype=np.bool_)]), axis=1)
+        bright, dark = at[rows, last], at[rows, last + 1]
+        width /= count + 1
+    return 0.5 * (bright + dark)
+
+
+def _crossings(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, size: float) -> FloatArray:
+    """Where between lit and dark points (n, 2), a side apart, the light ends."""
+    # neighbouring cells of a wave share their side
+    bits = np.column_stack([np.column_stack([bright, dark]).view(np.int64), names.view(np.int64)])
+    _, first, again = np.unique(bits, axis=0, return_index=True, return_inverse=True)
+    found = _ends(probe, bright[first], dark[first], names[first], FINE / size)
+    return np.asarray(found[again.ravel()], dtype=np.float64)
+
+
+def _chords(probe: Probe, squares: Squares, names: Array) -> FloatArray:
+    """Chords (n, 2, 2) across squares that an edge crosses once, lit to their left."""
+    lit = squares.lit
+    sides = lit != np.roll(lit, -1, axis=1)
+    first, second = np.argmax(sides, axis=1), 3 - np.argmax(sides[:, ::-1], axis=1)
+    rows = np.arange(len(lit))
+    side = np.stack([first, second], axis=1)
+    a, b = (squares.low[:, None] + squares.size * CORNERS[(side + step) % 4] for step in (0, 1))
+    from_a = lit[rows[:, None], side][..., None]
+    bright, dark = (np.where(from_a, x, y).reshape(-1, 2) for x, y in ((a, b), (b, a)))
+    chord = _crossings(probe, bright, dark, np.repeat(names, 2), squares.size).reshape(-1, 2, 2)
+    # corners go counter-clockwise: those from `first` + 1 to `second` lie right of the chord
+    right = lit[rows, (first + 1) % 4]
+    chord[right] = chord[right, ::-1]
+    return chord
+
+
+def _straight(
+    probe: Probe, chord: FloatArray, names: Array, scale: FloatArray, size: float
+) -> npt.NDArray[np.bool_]:
+    """Which chords are edges: the light changes near them, on both sides."""
+    along = chord[:, 1] - chord[:, 0]
+    length = np.linalg.norm(along, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        off = PIXEL / scale / np.minimum(length * scale, 1.0)
+        off = np.clip(off, STRAIGHT * size, np.maximum(COARSE * length, STRAIGHT * size))
+        left = np.stack([-along[:, 1], along[:, 0]], axis=1) / length[:, None]
+        left *= (off + np.abs(left) @ probe.fuzz)[:, None]
+    straight = np.ones(len(chord), dtype=np.bool_)
+    look = np.flatnonzero(length > SHORT * size)
+    point = chord[look, None, 0] + np.array(ALONG)[:, None] * along[look, None]
+    both = np.stack([point + left[look, None], point - left[look, None]], axis=1)
+    lit = probe.lit(both.reshape(-1, 2), np.repeat(names[look], 2 * len(ALONG))).reshape(-1, 2, len(ALONG))
+    straight[look] = lit[:, 0].all(axis=1) & ~lit[:, 1].any(axis=1)
+    return straight
+
+
+def main_axis(chord: FloatArray) -> npt.NDArray[np.int64]:
+    """The axis (0 columns, 1 rows) that chords rather lie along."""
+    along = np.abs(chord[:, 1] - chord[:, 0])
+    return (along[:, 1] > along[:, 0]).astype(np.int64)
+
+
+def _middles(
+    probe: Probe, squares: Squares, chord: FloatArray, axis: Array, names: Array
+) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    """Where across the middle of chords the edge is, and whether it is there."""
+    along = chord[:, 1] - chord[:, 0]
+    rows, across = np.arange(len(chord)), 1 - axis
+    length = np.linalg.norm(along, axis=1)
+    step = np.zeros_like(along)
+    step[rows, across] = 0.5 * length * np.where(along[rows, axis] > 0.0, 1.0, -1.0) * np.where(axis, -1, 1)
+    middle = chord.mean(axis=1)
+    ends = np.stack([middle + step, middle - step])
+    bright, dark = ends = np.clip(ends, squares.low, squares.low + squares.size)
+    lit, unlit = probe.lit(ends.reshape(-1, 2), np.tile(names, 2)).reshape(2, -1)
+    there = lit & ~unlit
+    off = np.clip(PIXEL / squares.scale, STRAIGHT, COARSE)
+    goal = max(FINER * float((off / np.maximum(length, off)).min(initial=1.0)), FINE)
+    middle[there] = _ends(probe, bright[there], dark[there], names[there], goal)
+    return middle, there
+
+
+def _gentle(chord: FloatArray, axis: Array) -> npt.NDArray[np.bool_]:
+    """Chords that lie more along an axis than across it."""
+    along, rows = np.abs(chord[:, 1] - chord[:, 0]), np.arange(len(chord))
+    return np.asarray(along[rows, 1 - axis] <= STEEP * along[rows, axis])
+
+
+def _bent(probe: Probe, squares: Squares, names: Array, last: bool) -> tuple[Pieces, npt.NDArray[np.bool_]]:
+    """Pieces of squares that an edge crosses once, halved where it bends; and where it does not work."""
+    chord = _chords(probe, squares, names)
+    axis, owner = main_axis(chord), np.arange(len(chord))
+    failed = np.zeros(len(chord), dtype=np.bool_)
+    found = []
+    for level in range(BENDS + 1):
+        own = names[owner]
+        straight = _straight(probe, chord, own, squares.scale[owner], squares.size)
+        straight |= level == BENDS or last
+        found.append((owner[straight], chord[straight], np.full(straight.sum(), level)))
+        owner, chord = owner[~straight], chord[~straight]
+        middle, there = _middles(probe, squares.part(owner), chord, axis[owner], names[owner])
+        there &= _gentle(chord, axis[owner])
+        failed[owner[~there]] = True
+        there &= ~failed[owner]
+        owner, chord, middle = owner[there], chord[there], middle[there]
+        if len(owner) == 0:
+            break
+        begin, end = np.moveaxis(chord, 1, 0)
+        chord = np.concatenate([np.stack([begin, middle], axis=1), np.stack([middle, end], axis=1)])
+        owner = np.tile(owner, 2)
+    owner, chord, level = (np.concatenate(column) for column in zip(*found, strict=True))
+    good = ~failed[owner]
+    return _strips(squares, axis, owner[good], chord[good], level[good]), failed
+
+
+def _strips(squares: Squares, axis: Array, owner: Array, chord: FloatArray, level: Array) -> Pieces:
+    """A square with a straight chord whole; else strips across the chords of its edge, and what is beside."""
+    low, high = squares.low[owner], squares.low[owner] + squares.size
+    rows = np.arange(len(owner))
+    along, across = axis[owner], 1 - axis[owner]
+    bent = level > 0
+    ends = np.sort(chord[rows, :, along], axis=1)
+    # lit on the left: above in a strip along columns that goes on, below in one along rows
+    forth = chord[rows, 1, along] > chord[rows, 0, along]
+    above = forth != (along == 1)
+    height = chord[rows, :, across]
+    low[rows[bent], along[bent]], high[rows[bent], along[bent]] = ends[bent].T
+    up, down = bent & above, bent & ~above
+    low[up, across[up]] = height[up].min(axis=1)
+    high[down, across[down]] = height[down].max(axis=1)
+    parts = [Pieces(squares.wave[owner], squares.cell[owner], low, high, chord)]
+    # the rectangles at either end of a bent edge
+    least, most = np.full(len(axis), np.inf), np.full(len(axis), -np.inf)
+    np.minimum.at(least, owner[bent], ends[bent, 0])
+    np.maximum.at(most, owner[bent], ends[bent, 1])
+    for corner, limit in ((0, least), (2, most)):
+        which = np.flatnonzero(np.isfinite(limit) & squares.lit[:, corner])
+        low, high = squares.low[which], squares.low[which] + squares.size
+        (high if corner == 0 else low)[np.arange(len(which)), axis[which]] = limit[which]
+        which, low, high = (column[(high > low).all(axis=1)] for column in (which, low, high))
+        blank = np.full((len(which), 2, 2), np.nan)
+        parts.append(Pieces(squares.wave[which], squares.cell[which], low, high, blank))
+    return Pieces.joined(parts)
+
+
+def _beside(squares: Squares, chosen: Array) -> npt.NDArray[np.bool_]:
+    """Squares of a wave that touch a chosen one."""
+    column, row = np.rint(squares.low / squares.size).astype(np.int64).T
+    stride, tall = column.max(initial=0) + 3, row.max(initial=0) + 3
+    number = (squares.wave * tall + row + 1) * stride + column + 1
+    steps = np.array([i * stride + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
+    return np.isin(number, (number[chosen][:, None] + steps).ravel())
+
+
+def _quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
+    """Four quarters of squares, with which of their corners are lit."""
+    low, size = squares.low, squares.size
+    nodes = np.zeros((len(low), 3, 3), dtype=np.bool_)  # [row, column]
+    nodes[:, 0, 0], nodes[:, 0, 2], nodes[:, 2, 2], nodes[:, 2, 0] = squares.lit.T
+    new = np.array([(1, 0), (0, 1), (1, 1), (2, 1), (1, 2)])  # column, row
+    at = (low[:, None] + 0.5 * size * new).reshape(-1, 2)
+    lit = probe.lit(at, np.repeat(names[squares.wave], len(new)))
+    nodes[:, new[:, 1], new[:, 0]] = lit.reshape(-1, len(new))
+    corner = [np.stack([nodes[:, j, i], nodes[:, j, i + 1], nodes[:, j + 1, i + 1], nodes[:, j + 1, i]], 1)
+              for j in (0, 1) for i in (0, 1)]  # fmt: skip
+    place = [low + 0.5 * size * np.array((i, j)) for j in (0, 1) for i in (0, 1)]
+    wave, cell, scale = (np.tile(column, 4) for column in (squares.wave, squares.cell, squares.scale))
+    return Squares(wave, cell, scale, np.concatenate(place), np.concatenate(corner), 0.5 * size)
+
+
+def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
+    """Cells cut along the edges between lit and dark corners; quartered where one edge will not do.
+
+    Parameters
+    ----------
+    probe : Probe
+    names : (waves,) uint64
+        Of the sequences that `squares.wave` counts.
+    squares : Squares
+        Cells, of size 1.
+
+    Returns
+    -------
+    Pieces
+        Of what is lit, in no order.
+    """
+    done = []
+    for depth in range(DEPTH + 1):
+        last = depth == DEPTH
+        crossed = (squares.lit != np.roll(squares.lit, -1, axis=1)).sum(axis=1)
+        once = np.flatnonzero(crossed == 2)
+        some = squares.part(once)
+        pieces, failed = _bent(probe, some, names[some.wave], last)
+        done.append(pieces)
+        rest = crossed == 4
+        rest[once[failed]] = True
+        # a corner may poke into a cell next to one with all its own corners dark, or lit
+        rest |= (crossed == 0) & _beside(squares, rest)
+        full = squares.part(np.flatnonzero((crossed == 0) & squares.lit[:, 0] & (~rest | last)))
+        blank = np.full((len(full.low), 2, 2), np.nan)
+        done.append(Pieces(full.wave, full.cell, full.low, full.low + squares.size, blank))
+        if last or not rest.any():
+            break
+        squares = _quarters(probe, names, squares.part(rest))
+    return Pieces.joined(done)
+
+
+def widened(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """A mask (rows, columns) and all its neighbours."""
+    rows, columns = mask.shape
+    wide = np.pad(mask, 1)
+    window = range(3)
+    return np.asarray(np.any([wide[i : i + rows, j : j + columns] for i in window for j in window], axis=0))

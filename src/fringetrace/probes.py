@@ -1,0 +1,257 @@
+"""Which way light takes from any point of a beam: rays traced anew, named after what they meet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.paths import Paths
+from fringetrace.rays import launch_at
+from fringetrace.scene import CCD, Beam, Scene, Surface
+from fringetrace.sheets import checked, landed
+from fringetrace.trace import trace
+from fringetrace.triangles import weld
+from fringetrace.waves import Array, FloatArray
+
+# Normals and heights of facets this near (relative to the mesh) are those of one plane.
+COPLANAR = 1e-9
+# Rays at the rim of the beam start this part of a cell inside it.
+RIM = 1e-9
+# Silhouettes, which single rays pass or hit, are known to this part of the scene's size.
+FUZZ = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Probe:
+    """A way to ask which sequences of surfaces the light takes from a point of the beam.
+
+    `parts` are those of `parted`; `keys` the sequences that are looked at, of up to so many `bounces`;
+    light fainter than `faintest` is not followed.
+    Without `half_wave_loss` a reflection off a mirror changes no sign.
+    """
+
+    scene: Scene
+    beam: Beam
+    ccd: CCD
+    parts: list[npt.NDArray[np.int64]]
+    keys: npt.NDArray[np.uint64]
+    bounces: int
+    faintest: float
+    half_wave_loss: bool
+
+    @property
+    def fuzz(self) -> FloatArray:
+        """How well edges are known, in cells of the beam's grid: along columns, along rows."""
+        bounds = np.stack([surface.mesh.bounds for surface in self.scene.surfaces])
+        size = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
+        cells = np.array(self.beam.shape[::-1]) / np.array(self.beam.size)
+        return np.asarray(FUZZ * size * cells, dtype=np.float64)
+
+    def paths(self, at: FloatArray) -> tuple[Paths, Array, npt.NDArray[np.uint64], npt.NDArray[np.bool_]]:
+        """Trace from points of the beam's grid.
+
+        Parameters
+        ----------
+        at : (n, 2) float64
+            Columns and rows, in cells from the grid's corner.
+
+        Returns
+        -------
+        paths : Paths
+            `ray` is the number of the point; amplitudes without the beam's profile.
+        rows : (m,) int64
+            Those that cross the CCD's plane of focus.
+        names : (m,) uint64
+            One for each sequence of branches and parts of surfaces (a 64-bit hash).
+        curved : (m,) bool
+            Whether a surface with a form was met.
+        """
+        inside = np.clip(at, RIM, np.array(self.beam.shape[::-1]) - RIM)
+        rays = launch_at(self.beam, inside[:, 0], inside[:, 1])
+        paths = trace(
+            self.scene, rays, self.ccd, max_bounces=self.bounces, min_amplitude=self.faintest, record=True
+        )
+        if not self.half_wave_loss:
+            sign = 1.0 - 2.0 * (paths.reflections % 2)
+            paths = replace(paths, amplitude=paths.amplitude * sign)
+        rows, _, _ = landed(paths, self.ccd)
+        rows = rows[np.isin(paths.key[rows], self.keys)]
+        return paths, rows, *self._names(paths, rows)
+
+    def _names(self, paths: Paths, rows: Array) -> tuple[npt.NDArray[np.uint64], npt.NDArray[np.bool_]]:
+        assert paths.surface is not None
+        assert paths.triangle is not None
+        names, curved = paths.key[rows].copy(), np.zeros(len(rows), dtype=np.bool_)
+        for bounce in range(paths.surface.shape[1]):
+            # the table is as wide as its longest path
+            there = np.flatnonzero(paths.bounces[rows] > bounce)
+            surface, triangle = paths.surface[rows[there], bounce], paths.triangle[rows[there], bounce]
+            part = np.zeros(len(there), dtype=np.int64)
+            for number in np.unique(surface):
+                mine = surface == number
+                part[mine] = self.parts[number][triangle[mine]]
+            curved[there] |= part < 0
+            names[there] = _mixed(names[there] * np.uint64(0x9E3779B97F4A7C15) + part.astype(np.uint64))
+        return names, curved
+
+    def lit(self, at: FloatArray, names: npt.NDArray[np.uint64]) -> npt.NDArray[np.bool_]:
+        """Whether light takes a sequence (n,) from a point (n, 2)."""
+        if len(at) == 0:
+            return np.zeros(0, dtype=np.bool_)
+        paths, rows, found, _ = self.paths(at)
+        ray = paths.ray[rows]
+        lit = np.zeros(len(at), dtype=np.bool_)
+        lit[ray[found == names[ray]]] = True
+        return lit
+
+
+def profile(beam: Beam, at: FloatArray) -> FloatArray:
+    """Amplitude of a beam at points of its grid.
+
+    Parameters
+    ----------
+    beam : Beam
+    at : (n, 2) float64
+        Columns and rows, in cells from the grid's corner.
+
+    Returns
+    -------
+    (n,) float64
+    """
+    if beam.profile is None:
+        return np.ones(len(at))
+    x, y = ((at / beam.shape[::-1] - 0.5) * beam.size).T
+    return np.asarray(np.broadcast_to(beam.profile(x, y), len(at)))
+
+
+def _mixed(number: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:
+    """Numbers scattered over 64 bits, one to one (Steele, Lea and Flood, OOPSLA 2014)."""
+    number = (number ^ (number >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    number = (number ^ (number >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return number ^ (number >> np.uint64(31))
+
+
+def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
+    """Which triangles of each surface are one: those in a plane, those that hang together on a form.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    list of (triangles,) int64
+        A number for the part that each triangle belongs to, one array a surface; below 0 on a form.
+    """
+    if "parts" not in scene.derived:
+        scene.derived["parts"] = [_parts(surface) for surface in scene.surfaces]
+    parts: list[npt.NDArray[np.int64]] = scene.derived["parts"]
+    return parts
+
+
+def _parts(surface: Surface) -> npt.NDArray[np.int64]:
+    mesh = surface.mesh
+    parts = np.empty(len(mesh.faces), dtype=np.int64)
+    flat = np.ones(len(mesh.faces), dtype=np.bool_)
+    if surface.form is not None:
+        flat = surface.form.fit(mesh.vertices, mesh.faces).along == 0
+        parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
+    a, b, c = np.moveaxis(mesh.vertices[mesh.faces[flat]], 1, 0)
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    size = float(np.ptp(mesh.bounds, axis=0).max())
+    height = np.einsum("ij,ij->i", normal, a - mesh.bounds.mean(axis=0)) / size
+    # off the middle between round numbers, where most designs have their planes
+    rounded = np.floor(np.column_stack([normal, height]) / COPLANAR + 0.377).astype(np.int64)
+    parts[flat] = np.unique(rounded, axis=0, return_inverse=True)[1].ravel()
+    return parts
+
+
+def _hanging_together(vertices: FloatArray, faces: Array) -> npt.NDArray[np.int64]:
+    """The least vertex of all faces that each face hangs together with."""
+    welded, faces = weld(vertices, faces)
+    label = np.arange(len(welded))
+    while True:
+        least = label[faces].min(axis=1)
+        lower = label.copy()
+        np.minimum.at(lower, faces.ravel(), np.repeat(least, 3))
+        lower = lower[lower]
+        if (lower == label).all():
+            return np.asarray(least, dtype=np.int64)
+        label = lower
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """Paths from the nodes of a beam's grid, sorted by name.
+
+    Attributes
+    ----------
+    probe : Probe
+    paths : Paths
+        `ray` is the number of the node, row * (columns + 1) + column.
+    names : (k,) uint64
+        Sequences found.
+    curved : (k,) bool
+        Those of them that met a form.
+    rows : list of (n,) int64
+        The paths of each.
+    """
+
+    probe: Probe
+    paths: Paths
+    names: npt.NDArray[np.uint64]
+    curved: npt.NDArray[np.bool_]
+    rows: list[npt.NDArray[np.int64]]
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of nodes."""
+        tall, wide = self.probe.beam.shape
+        return tall + 1, wide + 1
+
+    @property
+    def keys(self) -> npt.NDArray[np.uint64]:
+        """Path keys (k,) of the sequences."""
+        return self.paths.key[[rows[0] for rows in self.rows]]
+
+    def corners(self, index: int) -> npt.NDArray[np.bool_]:
+        """Which corners of the grid's cells a sequence is lit at, (rows, columns, 4), from (0, 0) around."""
+        lit = np.zeros(self.shape, dtype=np.bool_)
+        lit.ravel()[self.paths.ray[self.rows[index]]] = True
+        return np.stack([lit[:-1, :-1], lit[:-1, 1:], lit[1:, 1:], lit[1:, :-1]], axis=-1)
+
+
+def survey(paths: Paths, half_wave_loss: bool = True) -> Survey:
+    """Trace anew from the nodes of a beam's grid. What no node lights is not seen.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of a `Beam` onto a CCD; sequences of surfaces that are missing here are left out.
+    half_wave_loss : bool
+        False leaves out the factor -1 of each reflection off a mirror.
+
+    Returns
+    -------
+    Survey
+
+    Raises
+    ------
+    ValueError
+        If the source is no beam, or there is no CCD.
+    """
+    ccd, beam = checked(paths)
+    rows, _, _ = landed(paths, ccd)
+    keys, bounces = np.unique(paths.key[rows]), int(paths.bounces[rows].max(initial=0))
+    faintest = 0.5 * float(np.abs(paths.amplitude[rows]).min(initial=1.0))
+    probe = Probe(paths.scene, beam, ccd, parted(paths.scene), keys, bounces, faintest, half_wave_loss)
+    tall, wide = beam.shape[0] + 1, beam.shape[1] + 1
+    nodes = np.stack([np.tile(np.arange(wide), tall), np.repeat(np.arange(tall), wide)], 1).astype(np.float64)
+    traced, rows, found, curved = probe.paths(nodes)
+    names, first = np.unique(found, return_index=True)
+    order = np.argsort(found, kind="stable")
+    groups = np.split(rows[order], np.searchsorted(found[order], names)[1:]) if len(names) else []
+    return Survey(probe, traced, names, curved[first], groups)

@@ -1,0 +1,140 @@
+"""From the sheets of coherent beams to the light on the pixels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace import probes, regions, rims, sheets
+from fringetrace.paths import Paths
+from fringetrace.quadrature import Samples, averaged, edges
+from fringetrace.regions import Region, Wave
+from fringetrace.scene import Beam
+from fringetrace.sheets import Cells
+from fringetrace.waves import ComplexArray, FloatArray
+
+Numbers = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """What a beam brings to a CCD.
+
+    Attributes
+    ----------
+    beam : Beam
+    unit : float
+        Its area that a step of its grid stands for, in pixels.
+    plane : list of (group, Wave, Region)
+        Plane waves off facets.
+    curved : list of (group, Cells)
+        Curved sheets.
+    segments : (n, 4) float64, pixels
+        The edges of both: x, y of either end.
+    """
+
+    beam: Beam
+    unit: float
+    plane: list[tuple[int, Wave, Region]]
+    curved: list[tuple[int, Cells]]
+    segments: FloatArray
+
+    def add(self, period: float, points: Samples, field: ComplexArray, slope: FloatArray) -> None:
+        """Add to fields at sample points.
+
+        Parameters
+        ----------
+        period : float, metres
+            The wavelength.
+        points : Samples
+        field : (groups, points) complex128
+            Added to.
+        slope : (points, 4) float64, metres a pixel, or (0, 4)
+            Widened, see `quadrature.fringes`.
+        """
+        for group, wave, region in self.plane:
+            regions.spread(wave, region, self.beam, period, points, field[group], slope)
+        for group, cells in self.curved:
+            sheets.spread(cells, self.unit, period, points, field[group], slope)
+
+
+def light(paths: Paths, groups: Numbers, half_wave_loss: bool = True) -> Light:
+    """Plane waves and curved sheets of a beam.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of a `Beam`, onto a CCD.
+    groups : (paths,) int64
+        The group of each path, the same for all of a key.
+    half_wave_loss : bool
+        False leaves out the factor -1 of each reflection off a mirror.
+
+    Returns
+    -------
+    Light
+
+    Raises
+    ------
+    ValueError
+        If the source is no beam, or there is no CCD.
+    """
+    ccd, beam = sheets.checked(paths)
+    unit = beam.area / ccd.pitch**2
+    keys, first = np.unique(paths.key, return_index=True)
+
+    def group(key: np.uint64) -> int:
+        return int(groups[first[np.searchsorted(keys, key)]])
+
+    if paths.points is not None and paths.triangle is None:  # arrivals that no facet stands for
+        if not half_wave_loss:
+            paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
+        landed = np.unique(paths.key[sheets.landed(paths, ccd)[0]])
+        found = zip(landed, sheets.sheets(paths), strict=True)
+        curved = [(group(key), sheets.cells(sheet, ccd)) for key, sheet in found]
+        return Light(beam, unit, [], curved, np.empty((0, 4)))
+    survey = probes.survey(paths, half_wave_loss)
+    member = {name: group(key) for name, key in zip(survey.names, survey.keys, strict=True)}
+    plane = [(member[wave.name], wave, region) for wave, region in regions.waves(survey)]
+    cells, rim = rims.curved(survey)
+    named = [member[name] for name in survey.names[survey.curved]]
+    drawn = [wave.to_pixels(region.segments).reshape(-1, 4) for _, wave, region in plane]
+    return Light(beam, unit, plane, list(zip(named, cells, strict=True)), np.concatenate([rim, *drawn]))
+
+
+def fields(
+    lights: list[Light], groups: int, shape: tuple[int, int], period: float, carrier: bool
+) -> tuple[ComplexArray, ComplexArray]:
+    """Means over each pixel of the fields of groups of sheets, and of their products.
+
+    Parameters
+    ----------
+    lights : list of Light
+        Of coherent beams.
+    groups : int
+        How many there are.
+    shape : (rows, columns)
+        Of the CCD.
+    period : float, metres
+        The wavelength.
+    carrier : bool
+        Whether the mean fields matter: then pixels are sampled for the whole slope of the phase;
+        otherwise for the differences between the sheets that overlap.
+
+    Returns
+    -------
+    mean : (groups, rows, columns) complex128
+    mutual : (groups, groups, rows, columns) complex128
+        See `quadrature.averaged`.
+    """
+
+    def at(points: Samples, slope: FloatArray) -> ComplexArray:
+        field = points.blank(groups)
+        for beam in lights:
+            beam.add(period, points, field, slope)
+        return field
+
+    segments = np.concatenate([beam.segments for beam in lights])
+    return averaged(shape, at, period, carrier, edges(segments, shape))
