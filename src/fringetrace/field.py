@@ -44,7 +44,7 @@ def complex_field(
         For a wavelength that is none, an unknown method, paths without a CCD, or no paths at all;
         with "wavefront", for paths that are not of a beam.
     """
-    from fringetrace import kernels
+    from fringetrace.screens import gather
 
     period = checked_wavelength(wavelength)
     if method == "wavefront":
@@ -58,7 +58,7 @@ def complex_field(
         if total is None:
             total = np.zeros(part.ccd.shape, dtype=np.complex128)
         weight = 1.0 if part.area is None else part.area / part.ccd.pitch**2
-        kernels.gather(
+        gather(
             part.fate, part.origin, part.length, part.amplitude, part.reflections, half_wave_loss,
             screen(part.ccd), part.ccd.pitch, weight, period, total,
         )  # fmt: skip
