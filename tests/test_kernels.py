@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fringetrace as ft
-from fringetrace import engine, exact, kernels, shapes
+from fringetrace import bounces, engine, exact, kernels, screens, shapes
 from fringetrace.interfaces import reflect
 from fringetrace.paths import screen
 from fringetrace.rays import launch
@@ -42,7 +42,7 @@ def test_select_puts_the_smaller_keys_first(values, part, seed):
 @given(rays=st.lists(st.integers(0, 6), max_size=60), first=st.integers(0, 1000))
 def test_ends_are_sorted_by_ray_and_stay_in_order(rays, first):
     ray = np.array(rays, dtype=np.int64) + first
-    assert np.array_equal(kernels.sort(ray, first, 7), np.argsort(ray, kind="stable"))
+    assert np.array_equal(bounces.sort(ray, first, 7), np.argsort(ray, kind="stable"))
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 17, 64, 1000])
@@ -148,7 +148,7 @@ def test_reflections_are_those_of_the_formula(seed):
     direction, normal = unit(rng.normal(size=(2, 3)))
     expected = reflect(direction[None], normal[None])[0]
     for steps in (1, 8):  # the eighth is brought back to length 1
-        after = kernels.bounced(*direction, *normal, direction @ normal, steps)
+        after = bounces.bounced(*direction, *normal, direction @ normal, steps)
         np.testing.assert_allclose(after, expected, rtol=0, atol=4 * EPS)
 
 
@@ -156,7 +156,7 @@ def test_a_direction_keeps_its_length_over_many_reflections():
     rng = np.random.default_rng(3)
     direction = np.array([0.6, 0.0, 0.8])
     for steps, normal in enumerate(unit(rng.normal(size=(5000, 3)))):
-        direction = np.array(kernels.bounced(*direction, *normal, direction @ normal, steps))
+        direction = np.array(bounces.bounced(*direction, *normal, direction @ normal, steps))
     assert np.linalg.norm(direction) == pytest.approx(1.0, rel=16 * EPS, abs=0)
 
 
@@ -197,5 +197,5 @@ def test_a_place_on_the_ccd_is_counted_from_its_corner(seed):
     row, column = rng.uniform(0, [6, 10])
     point = ccd.centre + (column - 5) * 0.25 * u + (row - 3) * 0.25 * v
     pixel = np.empty((1, 2))
-    kernels.locate(screen(ccd), ccd.pitch, *ccd.shape, point[None], pixel)
+    screens.locate(screen(ccd), ccd.pitch, *ccd.shape, point[None], pixel)
     np.testing.assert_allclose(pixel, [[row, column]], rtol=0, atol=1e-12)

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from fringetrace.field import complex_field, irradiance, mutual_intensity
 from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
-from fringetrace.scene import CCD, Beam, Gaussian, Mesh, Scene, Surface
+from fringetrace.scene import CCD, Beam, Gaussian, Scene, Surface
 from fringetrace.trace import stream, trace
 from fringetrace.waves import degree, mm, nm, um
 

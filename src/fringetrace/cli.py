@@ -16,7 +16,7 @@ from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
 from fringetrace.drawing import unit_of
-from fringetrace.scene import Mesh
+from fringetrace.mesh import Mesh
 from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length
 
 if TYPE_CHECKING:

@@ -193,7 +193,7 @@ def _numbers(parts: list[Paths], groups: npt.ArrayLike) -> list[npt.NDArray[np.i
 
 def _sum(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> ComplexArray:
     """The coherent sum over rays."""
-    from fringetrace import kernels
+    from fringetrace.screens import gather
 
     total = np.empty((0, 0), dtype=np.complex128)
     for part in parts:
@@ -201,7 +201,7 @@ def _sum(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> Com
         if total.size == 0:
             total = np.zeros(part.ccd.shape, dtype=np.complex128)
         weight = 1.0 if part.area is None else part.area / part.ccd.pitch**2
-        kernels.gather(
+        gather(
             part.fate, part.origin, part.length, part.amplitude, part.reflections, half_wave_loss,
             screen(part.ccd), part.ccd.pitch, weight, wavelength, total,
         )  # fmt: skip

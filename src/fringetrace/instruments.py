@@ -9,7 +9,8 @@ import numpy as np
 
 from fringetrace.bench import Bench
 from fringetrace.interfaces import BeamSplitter, Interface, Mirror
-from fringetrace.scene import CCD, Beam, Mesh, Profile, Scene, Surface
+from fringetrace.mesh import Mesh
+from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
 from fringetrace.shapes import plate
 from fringetrace.vectors import rotation
 from fringetrace.waves import FloatArray

@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.bench import Bench, path_slope, pixel_centres
+from fringetrace.mesh import Mesh
 from fringetrace.meshes import interpolate_height
 from fringetrace.paths import Ledger
-from fringetrace.scene import Mesh
 from fringetrace.waves import Array, FloatArray
 
 if TYPE_CHECKING:

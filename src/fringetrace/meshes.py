@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.scene import Mesh
+from fringetrace.mesh import Mesh
 from fringetrace.shapes import (
     checked_length,
     corner_cube,

@@ -268,10 +268,10 @@ def pixels(ccd: CCD, point: FloatArray) -> FloatArray:
     (n, 2) float64
         (row, column) in pixels; pixel [i, j] spans [i, i+1) x [j, j+1).
     """
-    from fringetrace import kernels
+    from fringetrace.screens import locate
 
     pixel = np.empty((len(point), 2))
-    kernels.locate(screen(ccd), ccd.pitch, *ccd.shape, np.ascontiguousarray(point), pixel)
+    locate(screen(ccd), ccd.pitch, *ccd.shape, np.ascontiguousarray(point), pixel)
     return pixel
 
 

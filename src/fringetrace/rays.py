@@ -140,14 +140,14 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
     ValueError
         If the profile gives something other than one finite number a ray.
     """
-    from fringetrace import kernels
+    from fringetrace import bounces
 
     rows, columns = beam.shape
     start, stop, _ = slice(start, stop).indices(rows * columns)
     count = max(0, stop - start)
     u, v, n = beam.axes
     origin, direction = np.empty((count, 3)), np.empty((count, 3))
-    kernels.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
+    bounces.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
     amplitude = np.broadcast_to(np.complex128(1.0), (count,))  # read-only, and takes no room
     if beam.profile is not None:
         offset = origin - beam.centre
@@ -198,54 +198,60 @@ def launch_at(beam: Beam, column: FloatArray, row: FloatArray) -> Rays:
 
 
 @dataclass(frozen=True, eq=False)
-class Batch:
-    """Rays under way, one row each, changed in place by the bounce passes. Lengths in metres.
+class Tracks:
+    """What is known of paths under way as well as of those that have ended, one row each.
 
-    `state` has the columns that `kernels` names: origin, direction, normal of the face last left,
-    optical path, distance of the start from that face's edge. `last` is the triangle last left
-    (-1: none); `straight` says that the ray went through it. `lost` is the power given off on the
-    way, `serial` numbers the paths as they are born.
+    `lost` is the power given off on the way, `serial` numbers the paths as they are born.
     """
 
-    state: FloatArray
     lost: FloatArray
     amplitude: ComplexArray
     key: npt.NDArray[np.uint64]
     ray: npt.NDArray[np.int64]
-    last: npt.NDArray[np.int64]
     bounces: npt.NDArray[np.int32]
     reflections: npt.NDArray[np.int32]
-    straight: npt.NDArray[np.bool_]
     serial: npt.NDArray[np.int64]
+
+    @property
+    def columns(self) -> tuple[Array, ...]:
+        """All columns, as the kernels take them."""
+        return tuple(vars(self).values())
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
-    """Paths that have ended, one row each; columns as in `Batch`, and the reason."""
+class Batch(Tracks):
+    """Rays under way, changed in place by the bounce passes. Lengths in metres.
+
+    `state` has the columns that `kernels` names: origin, direction, normal of the face last left,
+    optical path, distance of the start from that face's edge. `last` is the triangle last left
+    (-1: none), `came` (n, 3) the direction of the last leg that was longer than 0.
+    """
+
+    state: FloatArray
+    last: npt.NDArray[np.int64]
+    came: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Ends(Tracks):
+    """Paths that have ended, and the reason."""
 
     origin: FloatArray
     direction: FloatArray
     length: FloatArray
-    lost: FloatArray
-    amplitude: ComplexArray
-    key: npt.NDArray[np.uint64]
-    ray: npt.NDArray[np.int64]
-    bounces: npt.NDArray[np.int32]
-    reflections: npt.NDArray[np.int32]
     fate: npt.NDArray[np.int8]
-    serial: npt.NDArray[np.int64]
 
 
 Table = TypeVar("Table", Batch, Ends)
 TYPES = {
     "amplitude": np.complex128, "key": np.uint64, "ray": np.int64, "last": np.int64, "serial": np.int64,
-    "bounces": np.int32, "reflections": np.int32, "fate": np.int8, "straight": np.bool_,
+    "bounces": np.int32, "reflections": np.int32, "fate": np.int8,
 }  # fmt: skip
 
 
 def blank(kind: type[Table], rows: int) -> Table:
     """Room for so many rows, not filled in."""
-    wide = {"origin": (rows, 3), "direction": (rows, 3), "state": (rows, 12)}
+    wide = {"origin": (rows, 3), "direction": (rows, 3), "came": (rows, 3), "state": (rows, 12)}
     names = [column.name for column in fields(kind)]
     return kind(**{name: np.empty(wide.get(name, rows), TYPES.get(name, np.float64)) for name in names})
 
@@ -274,7 +280,6 @@ def start(state: Batch, rays: Rays, first: int) -> None:
     first : int
         Number of the first of them.
     """
-    from fringetrace import kernels
+    from fringetrace.bounces import begin
 
-    n = len(rays)
-    kernels.begin(rays.origin, rays.direction, rays.length, first, *vars(part(state, 0, n)).values())
+    begin(rays.origin, rays.direction, rays.length, first, state.columns)

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.bodies import Body
 from fringetrace.crossings import Fit, Meeting
-from fringetrace.engine import Body, Engine, Hits
+from fringetrace.engine import Engine, Hits
 from fringetrace.engine import find as find_facets
 from fringetrace.rays import Batch
 from fringetrace.scene import Scene

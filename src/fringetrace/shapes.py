@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.scene import Mesh
+from fringetrace.mesh import Mesh
 from fringetrace.triangles import IndexArray, crossing, doubled_area, triangulate, weld
 from fringetrace.vectors import unit
 from fringetrace.waves import FloatArray

@@ -87,7 +87,7 @@ def _plan(
         raise TypeError(f"trace: expected a Beam or Rays, got {type(source).__name__}")
     if ccd is not None and not isinstance(ccd, CCD):
         raise TypeError(f"trace: expected a CCD or None, got {type(ccd).__name__}")
-    _whole(max_bounces, 0, "max_bounces")
+    most = _whole(max_bounces, 0, "max_bounces")
     if not (isinstance(min_amplitude, Real) and np.isfinite(min_amplitude) and min_amplitude >= 0.0):
         raise ValueError(f"min_amplitude: expected a number of at least 0, got {min_amplitude!r}")
     passed = frozenset(scene.index(name) for name in source.passes)
@@ -107,7 +107,7 @@ def _plan(
         reflection=reflection,
         transmission=transmission,
         screen=(0.0,) * 15 if ccd is None else screen(ccd),
-        max_bounces=max_bounces,
+        max_bounces=most,
         faint=float(min_amplitude) ** 2,
         record=record,
         plain=bool((reflection == -1.0).all() and not transmission.any()),
@@ -177,7 +177,7 @@ def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, ol
 
 def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
     """Follow the rays from `first` up to `stop` to all their ends: in `ends`, or in the workspace."""
-    from fringetrace import kernels
+    from fringetrace.bounces import interact
 
     rays = plan.rays(first, stop)
     if len(space.state.ray) < len(rays):
@@ -214,10 +214,9 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
         if record is not None:
             before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()}
         old = ended
-        count, _, ended, serials = kernels.interact(
-            count, *vars(state).values(), hits.met, hits.triangle,
-            plan.engine.owner, plan.reflection, plan.transmission, plan.plain, plan.screen,
-            plan.ccd is not None, plan.max_bounces, plan.faint, *vars(ends).values(), ended,
+        count, _, ended, serials = interact(
+            count, state.columns, hits.met, hits.triangle, plan.engine.owner, plan.reflection,
+            plan.transmission, plan.plain, limits.packed, plan.faint, ends.columns, ended,
             first if ordered else -1, serials,
         )  # fmt: skip
         if simple:
@@ -250,10 +249,10 @@ def _paths(
     `whole`: each ray is in its row already, and the arrays may be kept.
     """
     if not whole:
-        from fringetrace import kernels
+        from fringetrace.bounces import sort
 
         # a ray's ends come in an order that does not depend on other rays: a stable sort keeps it
-        order = kernels.sort(ends.ray, first, len(launched))
+        order = sort(ends.ray, first, len(launched))
         ends = Ends(**{name: column[order] for name, column in vars(ends).items()})
     # a broadcast 1 (no strides) stands for amplitudes that are all 1
     relative = launched[ends.ray - first] if len(ends.ray) > len(launched) else launched
