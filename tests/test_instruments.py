@@ -19,6 +19,14 @@ def michelson(**options):
     return instruments.michelson(options.pop("sample"), **options)
 
 
+def test_the_wavefront_does_with_few_rays():
+    fine, coarse = (
+        michelson(pixels=(64, 96), rays=rays, reference_tilt=(2e-4, 1e-4)) for rays in (1, 1 / 16)
+    )
+    assert coarse.beam.shape == (5, 6)
+    np.testing.assert_allclose(coarse.interferogram(HENE), fine.interferogram(HENE), atol=1e-6)
+
+
 @pytest.mark.parametrize("rays", [1, 3])
 def test_rays_start_over_the_centres_of_the_pixels(rays):
     """Row by row; the splitter shows the beam from behind, so columns run the other way."""
@@ -119,8 +127,8 @@ def test_the_most_tilted_reference_still_comes_back(tilt, piston):
         ({"pixels": (0, 4)}, r"michelson pixels: expected positive whole \(rows, columns\), got \(0, 4\)"),
         ({"pixels": (4.5, 4)}, "michelson pixels: expected positive whole"),
         ({"pixels": (4, 4, 4)}, "michelson pixels: expected positive whole"),
-        ({"rays": 0}, "michelson rays: expected a positive whole number, got 0"),
-        ({"rays": 1.5}, "michelson rays: expected a positive whole number, got 1.5"),
+        ({"rays": 0}, "michelson rays: expected a positive whole number, or a part of 1, got 0"),
+        ({"rays": 1.5}, "michelson rays: expected a positive whole number, or a part of 1, got 1.5"),
         ({"arm": 1.9 * APERTURE}, "michelson arm: expected at least 2.0 times the aperture, 0.012 m, got"),
         ({"arm": math.nan}, "michelson arm: expected at least 2.0 times the aperture"),
         ({"reference_tilt": (0.08, 0.08)}, "michelson reference_tilt: expected up to 0.1 rad, got"),

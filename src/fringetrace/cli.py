@@ -56,7 +56,7 @@ class Settings:
     pixels
         Pixels along the longer side of the image; the other side follows from the sample's shape.
     rays
-        Rays a pixel along either axis: 2 traces four rays a pixel.
+        Rays a pixel along either axis: 2 traces four rays a pixel, 0.125 one in 8 x 8 pixels.
     steps
         Phase steps over one period, at least 3.
     tilt
@@ -69,7 +69,7 @@ class Settings:
 
     wavelength: str = "632.8 nm"
     pixels: int = 512
-    rays: int = 1
+    rays: float = 1
     steps: int = 4
     tilt: str | None = None
     threads: int | None = None

@@ -25,6 +25,8 @@ SHORTEST = 2.0
 TALLEST = 3.0
 TILT = 0.1
 PISTON = 0.1
+# Rays along either axis at least: what differences of fourth order need.
+LEAST = 5
 
 
 def michelson(
@@ -34,7 +36,7 @@ def michelson(
     reference_tilt: tuple[float, float] = (0.0, 0.0),
     piston: float = 0.0,
     pixels: tuple[int, int] = (512, 512),
-    rays: int = 1,
+    rays: float = 1,
     profile: Profile | None = None,
     arm: float | None = None,
     splitter: Interface = BeamSplitter(),  # noqa: B008 - frozen
@@ -61,8 +63,10 @@ def michelson(
     piston : float, metres
         Displacement of the reference mirror away from the splitter: its path is 2 piston longer.
     pixels : (rows, columns)
-    rays : int
-        Rays a pixel, along either axis: rays**2 in all, from the centres of its parts.
+    rays : float
+        Rays a pixel, along either axis: rays**2 in all, from the centres of its parts. The wavefront
+        does with fewer than one, such as 1/8: one in 8 x 8 pixels. Features narrower than the rays'
+        spacing may then be missed.
     profile : callable, optional
         Amplitude of the beam at (x, y) of the image, metres; None is uniform. See `Gaussian`.
     arm : float, metres, optional
@@ -101,8 +105,10 @@ def michelson(
             Surface(facing.moved((arm + piston) * x), mirror, "reference"),
         )
     )
+    least = 1 if rays >= 1 else LEAST
+    shape = max(least, round(rows * rays)), max(least, round(columns * rays))
     beam = Beam(
-        centre=-arm * x, direction=x, up=y, size=size, shape=(rows * rays, columns * rays),
+        centre=-arm * x, direction=x, up=y, size=size, shape=shape,
         profile=None if profile is None else partial(_seen, profile),
     )  # fmt: skip
     ccd = CCD(
@@ -113,15 +119,15 @@ def michelson(
 
 
 def _layout(
-    aperture: float, pixels: tuple[int, int], rays: int, arm: float | None, top: float
+    aperture: float, pixels: tuple[int, int], rays: float, arm: float | None, top: float
 ) -> tuple[tuple[float, float], float]:
     """Width and height of the beam and the length of the arms, once they are known to fit."""
     if not (math.isfinite(aperture) and aperture > 0.0):
         raise ValueError(f"michelson aperture: expected a positive length in metres, got {aperture!r}")
     if len(pixels) != 2 or not all(isinstance(n, (int, np.integer)) and n > 0 for n in pixels):
         raise ValueError(f"michelson pixels: expected positive whole (rows, columns), got {pixels!r}")
-    if not isinstance(rays, (int, np.integer)) or rays < 1:
-        raise ValueError(f"michelson rays: expected a positive whole number, got {rays!r}")
+    if not (0.0 < rays < 1.0 or (rays >= 1 and float(rays).is_integer())):
+        raise ValueError(f"michelson rays: expected a positive whole number, or a part of 1, got {rays!r}")
     size = (aperture, aperture * pixels[0] / pixels[1])
     arm = max(SHORTEST * max(size), TALLEST * top) if arm is None else arm
     if not (math.isfinite(arm) and arm >= SHORTEST * max(size)):
