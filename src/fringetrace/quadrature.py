@@ -60,16 +60,21 @@ def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
     return np.minimum(LEAST + np.searchsorted(limits, cycles), MOST).astype(np.int64)
 
 
-def gauss_table() -> tuple[FloatArray, FloatArray]:
+def gauss_table(orders: Array) -> tuple[FloatArray, FloatArray]:
     """Nodes and weights on [0, 1] of the Gauss-Legendre rules.
+
+    Parameters
+    ----------
+    orders : int64, any shape
+        Which rules are wanted, up to `MOST`.
 
     Returns
     -------
     nodes, weights : (MOST + 1, MOST) float64
-        Row n is the rule of n points.
+        Row n is the rule of n points; 0 where it is not wanted.
     """
     nodes, weights = np.zeros((MOST + 1, MOST)), np.zeros((MOST + 1, MOST))
-    for n in range(1, MOST + 1):
+    for n in np.flatnonzero(np.bincount(orders.ravel(), minlength=1)[1:]) + 1:
         at, weight = np.polynomial.legendre.leggauss(n)
         nodes[n, :n], weights[n, :n] = 0.5 + 0.5 * at, 0.5 * weight
     return nodes, weights
@@ -198,7 +203,7 @@ def samples(order: npt.NDArray[np.int64], top: int, cuts: Edges | None = None) -
         order[cut] = 0
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     x, y, weight = (np.empty(first[-1]) for _ in range(3))
-    raster.lattice(order, columns, top, *gauss_table(), first, x, y, weight)
+    raster.lattice(order, columns, top, *gauss_table(order), first, x, y, weight)
     # rows of the cut pixels, in their order
     into = np.repeat(first[cut], count[cut]) + np.arange(len(pieces))
     into -= np.repeat(np.cumsum(count[cut]) - count[cut], count[cut])
@@ -279,14 +284,16 @@ def averaged(
     centre, slope = _centres(shape, light)
     product = mutual_products(centre)
     cycles = fringes(slope, carrier) / period
-    bend = _laplacian(product) / 24.0
+    bend = _curvature(product)
     even = (cycles <= GENTLE) & ~_cut(shape, cuts) & _small(bend, product)
     if carrier:
-        even &= _small(_laplacian(centre) / 24.0, centre)
+        bent = _curvature(centre)
+        even &= _small(bent, centre)
+        centre += bent
     order = np.where(even, 0, gauss_order(cycles))
     mean, mutual = _sampled(order, light, cuts)
-    mean[:, even] = (centre + _laplacian(centre) / 24.0)[:, even]
-    mutual[:, :, even] = (product + bend)[:, :, even]
+    np.copyto(mean, centre, where=even)
+    np.copyto(mutual, product + bend, where=even)
     return mean, mutual
 
 
@@ -304,12 +311,15 @@ def mutual_products(field: ComplexArray) -> ComplexArray:
     return np.asarray(field[:, None] * np.conj(field[None]), dtype=np.complex128)
 
 
-def _laplacian(values: ComplexArray) -> ComplexArray:
-    """Second differences along both axes of images (..., rows, columns); 0 at the rim."""
+def _curvature(values: ComplexArray) -> ComplexArray:
+    """(f_xx + f_yy) / 24 of images (..., rows, columns), by differences; 0 at the rim."""
     result = np.zeros_like(values)
-    inner = values[..., 1:-1, 1:-1]
-    around = values[..., 2:, 1:-1] + values[..., :-2, 1:-1] + values[..., 1:-1, 2:] + values[..., 1:-1, :-2]
-    result[..., 1:-1, 1:-1] = around - 4.0 * inner
+    inner = result[..., 1:-1, 1:-1]
+    np.add(values[..., 2:, 1:-1], values[..., :-2, 1:-1], out=inner)
+    inner += values[..., 1:-1, 2:]
+    inner += values[..., 1:-1, :-2]
+    inner -= 4.0 * values[..., 1:-1, 1:-1]
+    inner /= 24.0
     return result
 
 
