@@ -19,6 +19,8 @@ INSIDE = 0.02
 RANK = 1e-8
 # Degree of the polynomials whose slopes give the Jacobian, one more than cubic patches resolve.
 DEGREE = 5
+# Between rays is no more than this part of what half of them span.
+NEAR = 0.5
 # Fewer rays do not tell a Jacobian.
 FEWEST = 6
 # Powers of s in the Legendre polynomials of 2 s - 1.
@@ -183,8 +185,8 @@ def places(pieces: Pieces, owner: Array, count: int) -> tuple[FloatArray, FloatA
 
 def fitted(
     at: FloatArray, low: FloatArray, high: FloatArray, ray: Array, arrived: Arrivals, amplitude: ComplexArray,
-    base: float,
-) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_]]:  # fmt: skip
+    base: float, shape: tuple[int, int],
+) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_], FloatArray]:  # fmt: skip
     """Patches of a sheet by least squares.
 
     Parameters
@@ -199,6 +201,8 @@ def fitted(
     amplitude : (m,) complex128
     base : float, metres
         Paths are fitted less this.
+    shape : (rows, columns)
+        Of the CCD.
 
     Returns
     -------
@@ -207,7 +211,9 @@ def fitted(
     turns : (n, 2) int64
         Caustics passed where J < 0 and where J > 0.
     good : (n,) bool
-        Patches that enough rays arrived of.
+        Patches that enough rays arrived of, some of them near the CCD.
+    off : (n,) float64, pixels
+        What the rays are off the patches, root mean square.
     """
     count = len(at)
     known = np.zeros(count * RAYS, dtype=np.bool_)
@@ -219,23 +225,31 @@ def fitted(
     row[ray] = np.arange(len(ray))
     row = row.reshape(count, RAYS)
     row = np.where(known, row, row[np.arange(count), np.argmax(known, axis=1)][:, None])
+    good &= _near(arrived.x[row], shape[1]) & _near(arrived.y[row], shape[0]) if len(ray) else False
     coefficients, turns = np.zeros((count, 6, 4, 4)), np.zeros((count, 2), dtype=np.int64)
+    off = np.zeros(count)
     chosen = np.flatnonzero(good)
     for some in np.split(chosen, range(CHUNK, len(chosen), CHUNK)):
         if len(some):
             size = (high - low)[some]
             place = (at[some] - low[some, None]) / size[:, None]
-            coefficients[some], turns[some] = _patches(
+            coefficients[some], turns[some], off[some] = _patches(
                 place, np.sqrt(size.prod(axis=1)), known[some], row[some], arrived, amplitude, base
             )
-    return coefficients, turns, good
+    return coefficients, turns, good, off
+
+
+def _near(x: FloatArray, count: int) -> npt.NDArray[np.bool_]:
+    """Whether rays (n, RAYS) span some of the pixels from 0 to `count`, or are near it."""
+    least, middle, most = (f(x, axis=1) for f in (np.min, np.median, np.max))
+    return np.asarray((least - NEAR * (middle - least) < count) & (most + NEAR * (most - middle) > 0.0))
 
 
 def _patches(
     place: FloatArray, root: FloatArray, known: Array, row: Array, arrived: Arrivals,
     amplitude: ComplexArray, base: float,
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:  # fmt: skip
-    """Coefficients and turns of patches; `root` of their part of a cell, `row` of their rays."""
+) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:  # fmt: skip
+    """Coefficients, turns, residuals; `root` of the part of a cell that patches are, `row` of their rays."""
     (s, slope_s), (t, slope_t) = (_legendre(2.0 * u - 1.0) for u in np.moveaxis(place, -1, 0))
     i, j = (index.ravel() for index in np.indices((DEGREE + 1, DEGREE + 1)))
     i, j = i[(low := i + j <= DEGREE)], j[low]
@@ -251,7 +265,10 @@ def _patches(
     light = amplitude[row] * root[:, None]
     values = np.stack([x, y, w, area, light.real, light.imag], axis=-1) * known[..., None]
     cubic = (s[..., :4, None] * t[..., None, :4]).reshape(*s.shape[:2], 16)
-    found = np.linalg.pinv(cubic * known[..., None], rcond=RANK) @ values
+    cubic *= known[..., None]
+    found = np.linalg.pinv(cubic, rcond=RANK) @ values
+    left = (cubic @ found - values)[..., :2]
+    off = np.sqrt((left**2).sum(axis=(1, 2)) / known.sum(axis=1))
     found = np.swapaxes(found, 1, 2).reshape(-1, 6, 4, 4)
     turns = np.zeros((len(x), 2), dtype=np.int64)
     if arrived.way is not None:
@@ -261,7 +278,7 @@ def _patches(
             best = np.argmax(size, axis=1)
             surest = np.arange(len(best)), best
             turns[:, branch] = np.where(size[surest] > 0.0, passed[surest], 0)
-    return POWERS.T @ found @ POWERS, turns
+    return POWERS.T @ found @ POWERS, turns, off
 
 
 def _legendre(x: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -262,8 +262,19 @@ def _beside(squares: Squares, chosen: Array) -> npt.NDArray[np.bool_]:
     return np.isin(number, (number[chosen][:, None] + steps).ravel())
 
 
-def _quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
-    """Four quarters of squares, with which of their corners are lit."""
+def quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
+    """Four quarters of squares, with which of their corners are lit.
+
+    Parameters
+    ----------
+    probe : Probe
+    names : (waves,) uint64
+    squares : Squares
+
+    Returns
+    -------
+    Squares
+    """
     low, size = squares.low, squares.size
     nodes = np.zeros((len(low), 3, 3), dtype=np.bool_)  # [row, column]
     nodes[:, 0, 0], nodes[:, 0, 2], nodes[:, 2, 2], nodes[:, 2, 0] = squares.lit.T
@@ -287,7 +298,6 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
     names : (waves,) uint64
         Of the sequences that `squares.wave` counts.
     squares : Squares
-        Cells, of size 1.
 
     Returns
     -------
@@ -295,8 +305,9 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
         Of what is lit, in no order.
     """
     done = []
-    for depth in range(DEPTH + 1):
-        last = depth == DEPTH
+    finest = 0.5**DEPTH
+    while True:
+        last = squares.size <= finest
         crossed = (squares.lit != np.roll(squares.lit, -1, axis=1)).sum(axis=1)
         once = np.flatnonzero(crossed == 2)
         some = squares.part(once)
@@ -311,7 +322,7 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
         done.append(Pieces(full.wave, full.cell, full.low, full.low + squares.size, blank))
         if last or not rest.any():
             break
-        squares = _quarters(probe, names, squares.part(rest))
+        squares = quarters(probe, names, squares.part(rest))
     return Pieces.joined(done)
 
 
