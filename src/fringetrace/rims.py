@@ -59,7 +59,7 @@ def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
     pieces = cut(probe, names, cells)
     pieces = pieces.part(np.lexsort((pieces.cell, pieces.wave)))
     coefficients, areas = zip(*(patches(grid) for grid in grids), strict=True)
-    plain = _plain(pieces, grids, coefficients)
+    plain = _plain(probe, names, pieces, grids, coefficients)
     fits = _fits(probe, names, cells, pieces.part(~plain), [grid.base for grid in grids])
     found, drawn = [], [np.empty((0, 4))]
     for n, (grid, fit) in enumerate(zip(grids, fits, strict=True)):
@@ -125,17 +125,28 @@ def _complete(lit: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 
 def _plain(
-    pieces: Pieces, grids: list[Sheet], coefficients: tuple[FloatArray, ...]
+    probe: Probe, names: Array, pieces: Pieces, grids: list[Sheet], patched: tuple[FloatArray, ...]
 ) -> npt.NDArray[np.bool_]:
-    """Pieces that are whole cells between nodes with neighbours enough."""
+    """Pieces that are whole cells between nodes with neighbours enough, and the rays in their middle agree."""
     plain = pieces.whole
-    for n, (grid, known) in enumerate(zip(grids, coefficients, strict=True)):
+    middle = np.full((len(plain), 2), np.nan)
+    for n, (grid, coefficients) in enumerate(zip(grids, patched, strict=True)):
         complete = _complete(np.isfinite(grid.x))
         good = complete[:-1, :-1] & complete[:-1, 1:] & complete[1:, 1:] & complete[1:, :-1]
-        good &= np.isfinite(known).all(axis=(2, 3, 4))
+        good &= np.isfinite(coefficients).all(axis=(2, 3, 4))
         mine = pieces.wave == n
         plain[mine] &= good.ravel()[pieces.cell[mine]]
-    return plain
+        half = 0.5 ** np.arange(4)
+        middle[mine] = (half @ coefficients[:, :, :2] @ half).reshape(-1, 2)[pieces.cell[mine]]
+    rows = np.flatnonzero(plain)
+    paths, landed, found, _ = probe.paths(pieces.low[rows] + 0.5)
+    arrived = rows[paths.ray[landed]]
+    here = arrivals(paths, landed, probe.ccd)
+    with np.errstate(invalid="ignore"):
+        off = np.hypot(here.x - middle[arrived, 0], here.y - middle[arrived, 1])
+    sure = np.zeros(len(plain), dtype=np.bool_)
+    sure[arrived[(off < POOR) & (found == names[pieces.wave[arrived]])]] = True
+    return sure
 
 
 def _fits(
