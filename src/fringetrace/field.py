@@ -140,9 +140,7 @@ def _wavefront(
     return averaged(order, lambda points: light(points, np.empty((0, 4))), edges(segments, ccd.shape))
 
 
-def _sheets(
-    paths: Paths, half_wave_loss: bool
-) -> tuple[list[tuple[Wave, Region]], list[Cells], FloatArray]:
+def _sheets(paths: Paths, half_wave_loss: bool) -> tuple[list[tuple[Wave, Region]], list[Cells], FloatArray]:
     """Plane waves, curved sheets, and the edges of both on the pixels."""
     from fringetrace import probes, regions, rims, sheets
 

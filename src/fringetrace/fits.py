@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -87,10 +88,10 @@ class Fit:
         return np.asarray(np.einsum("nfi,ni->nf", lines, s), dtype=np.float64)
 
     def drawn(self, ends: FloatArray, owner: Array, most: int) -> FloatArray:
-        """Segments (m, 4) on the CCD of lines (n, 2, 2) on the beam's grid, a pixel long, or `most` a line."""
+        """Segments (m, 4) on the CCD of lines (n, 2, 2) on the beam's grid, a pixel long, `most` each."""
         begin, end = np.moveaxis(ends, 1, 0)
         stops = [self.pixels(begin + f * (end - begin), owner) for f in (0.0, 0.5, 1.0)]
-        length = sum(np.linalg.norm(b - a, axis=1) for a, b in zip(stops[:-1], stops[1:], strict=True))
+        length = sum(np.linalg.norm(b - a, axis=1) for a, b in pairwise(stops))
         count = np.clip(np.ceil(length), 1, most).astype(np.int64)
         line = np.repeat(np.arange(len(count)), count)
         step = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
@@ -111,7 +112,9 @@ def _trapezoids(pieces: Pieces) -> tuple[Array, Array, FloatArray, FloatArray, F
     above = (order[:, 0] == 0) != (axis == 1)  # lit on the left
     bottom = np.where((cut & above)[:, None], height, floor[:, None])
     top = np.where((cut & ~above)[:, None], height, roof[:, None])
-    parts = [(rows, axis, np.where(cut[:, None], ends, np.stack([least, most], axis=1)), bottom, top)]
+    parts: list[tuple[Array, ...]] = [
+        (rows, axis, np.where(cut[:, None], ends, np.stack([least, most], axis=1)), bottom, top)
+    ]
     # beside a chord that does not reach from end to end, all is lit or nothing
     a, b, c = pieces.lines.T
     for begin, end in ((least, ends[:, 0]), (ends[:, 1], most)):
@@ -119,8 +122,8 @@ def _trapezoids(pieces: Pieces) -> tuple[Array, Array, FloatArray, FloatArray, F
         middle[rows, axis], middle[rows, across] = 0.5 * (begin + end), 0.5 * (floor + roof)
         lit = np.flatnonzero(cut & (a * middle[:, 0] + b * middle[:, 1] > c))
         wide = np.stack([begin, end], axis=1)
-        flat = (np.repeat(level[lit, None], 2, axis=1) for level in (floor, roof))
-        parts.append((lit, axis[lit], wide[lit], *flat))
+        bottom, top = (np.repeat(level[lit, None], 2, axis=1) for level in (floor, roof))
+        parts.append((lit, axis[lit], wide[lit], bottom, top))
     piece, axis, along, bottom, top = (np.concatenate(column) for column in zip(*parts, strict=True))
     kept = (along[:, 1] > along[:, 0]) & ((top - bottom).max(axis=1) > 0.0)
     return piece[kept], axis[kept], along[kept], bottom[kept], top[kept]
@@ -216,14 +219,12 @@ def fitted(
         What the rays are off the patches, root mean square.
     """
     count = len(at)
-    known = np.zeros(count * RAYS, dtype=np.bool_)
-    known[ray] = True
-    known = known.reshape(count, RAYS)
+    known = np.isin(np.arange(count * RAYS), ray).reshape(count, RAYS)
     good = known.sum(axis=1) >= FEWEST
     # any other ray of the patch stands in for one that is missing, without weight
-    row = np.zeros(count * RAYS, dtype=np.int64)
-    row[ray] = np.arange(len(ray))
-    row = row.reshape(count, RAYS)
+    number = np.zeros(count * RAYS, dtype=np.int64)
+    number[ray] = np.arange(len(ray))
+    row: Array = number.reshape(count, RAYS)
     row = np.where(known, row, row[np.arange(count), np.argmax(known, axis=1)][:, None])
     good &= _near(arrived.x[row], shape[1]) & _near(arrived.y[row], shape[0]) if len(ray) else False
     coefficients, turns = np.zeros((count, 6, 4, 4)), np.zeros((count, 2), dtype=np.int64)
@@ -257,7 +258,8 @@ def _patches(
     along = np.stack([slope_s[..., i] * t[..., j], s[..., i] * slope_t[..., j]], axis=2)
 
     def slopes(values: FloatArray) -> FloatArray:
-        return np.einsum("nrkp,npv->nrkv", along, fine @ (values * known[..., None]))
+        found = np.einsum("nrkp,npv->nrkv", along, fine @ (values * known[..., None]))
+        return np.asarray(found, dtype=np.float64)
 
     x, y, w = arrived.x[row], arrived.y[row], arrived.length[row] - base
     steps = slopes(np.stack([x, y], axis=-1))
@@ -289,4 +291,4 @@ def _legendre(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     slope = np.zeros((DEGREE + 1, DEGREE + 1))
     for k in range(1, DEGREE + 1):
         slope[:k, k] = 2.0 * legendre.legder(np.eye(DEGREE + 1)[k])[:k]
-    return value, np.asarray(value @ slope, dtype=np.float64)
+    return np.asarray(value, dtype=np.float64), np.asarray(value @ slope, dtype=np.float64)

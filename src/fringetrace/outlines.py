@@ -99,7 +99,13 @@ class Squares:
     def part(self, rows: Array) -> Squares:
         """Some of them."""
         columns = (self.wave, self.cell, self.scale, self.low, self.lit)
-        return Squares(*(column[rows] for column in columns), self.size)
+        return Squares(*(column[rows] for column in columns), size=self.size)
+
+    @staticmethod
+    def joined(parts: list[Squares]) -> Squares:
+        """One table of several of a size, at least one."""
+        columns = zip(*((p.wave, p.cell, p.scale, p.low, p.lit) for p in parts), strict=True)
+        return Squares(*(np.concatenate(column) for column in columns), size=parts[0].size)
 
 
 def _ends(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, goal: float) -> FloatArray:
@@ -194,9 +200,7 @@ def _gentle(chord: FloatArray, axis: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(along[rows, 1 - axis] <= STEEP * along[rows, axis])
 
 
-def _bent(
-    probe: Probe, squares: Squares, names: Array, last: bool
-) -> tuple[Pieces, npt.NDArray[np.bool_]]:
+def _bent(probe: Probe, squares: Squares, names: Array, last: bool) -> tuple[Pieces, npt.NDArray[np.bool_]]:
     """Pieces of squares that an edge crosses once, halved where it bends; and where it does not work."""
     chord = _chords(probe, squares, names)
     axis, owner = main_axis(chord), np.arange(len(chord))
@@ -285,8 +289,10 @@ def quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
     corner = [np.stack([nodes[:, j, i], nodes[:, j, i + 1], nodes[:, j + 1, i + 1], nodes[:, j + 1, i]], 1)
               for j in (0, 1) for i in (0, 1)]  # fmt: skip
     place = [low + 0.5 * size * np.array((i, j)) for j in (0, 1) for i in (0, 1)]
-    wave, cell, scale = (np.tile(column, 4) for column in (squares.wave, squares.cell, squares.scale))
-    return Squares(wave, cell, scale, np.concatenate(place), np.concatenate(corner), 0.5 * size)
+    return Squares(
+        wave=np.tile(squares.wave, 4), cell=np.tile(squares.cell, 4), scale=np.tile(squares.scale, 4),
+        low=np.concatenate(place), lit=np.concatenate(corner), size=0.5 * size,
+    )  # fmt: skip
 
 
 def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
@@ -326,7 +332,7 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
     return Pieces.joined(done)
 
 
-def widened(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def widened(mask: Array) -> npt.NDArray[np.bool_]:
     """A mask (rows, columns) and all its neighbours."""
     rows, columns = mask.shape
     wide = np.pad(mask, 1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -26,8 +26,10 @@ from fringetrace.waves import Array, FloatArray
 
 # Segments that an edge within a cell is drawn with, at most.
 SEGMENTS = 64
-# Rays this many pixels off a fit tell that it is poor, and its cell is quartered, so often;
-POOR, QUARTERS = 1e-3, 3
+# Rays this many pixels off in the middle of a patch tell that it is none.
+MIDDLE = 1e-4
+# Fits that rays are so many off are poor: samples fall through the seams; cells are quartered so often;
+POOR, QUARTERS = 1e-5, 3
 # where they are still so many off, light is going everywhere and nothing is there.
 LOST = 0.1
 # Neighbours in a row that differences of fourth order need.
@@ -49,12 +51,11 @@ def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
         Their edges, and the rim of the beam: x, y of either end.
     """
     probe = survey.probe
-    which = np.flatnonzero(survey.curved)
-    if len(which) == 0:
+    which = np.flatnonzero(survey.curved).tolist()
+    if not which:
         return [], np.empty((0, 4))
     grids = [_grid(survey, index) for index in which]
-    squares = [_squares(survey, index, grid, n) for n, (index, grid) in enumerate(zip(which, grids, strict=True))]
-    cells = Squares(*(np.concatenate(column) for column in zip(*squares, strict=True)), 1.0)
+    cells = Squares.joined([_squares(survey, index, grids[n], n) for n, index in enumerate(which)])
     names = survey.names[which]
     pieces = cut(probe, names, cells)
     pieces = pieces.part(np.lexsort((pieces.cell, pieces.wave)))
@@ -88,17 +89,18 @@ def _around(values: FloatArray) -> FloatArray:
     return np.where(np.isfinite(corner), corner, near)
 
 
-def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> tuple[Array, ...]:
-    """Cells that a sheet may light, towards the CCD; columns of `Squares`."""
+def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> Squares:
+    """Cells that a sheet may light, towards the CCD."""
     lit = survey.corners(index)
     x, y = grid.x, grid.y
     steps = [np.hypot(differences(x, axis), differences(y, axis)) for axis in (0, 1)]
     scale = np.maximum(*(_around(step) for step in steps))
-    scale = np.where(scale > 0.0, scale, PIXEL / STRAIGHT)
+    # light that goes past the CCD's plane is spread without bounds
+    scale = np.minimum(np.where(scale > 0.0, scale, PIXEL / STRAIGHT), max(survey.probe.ccd.shape))
     # the least step: next to where light goes past the CCD's plane there are large ones
     margin = -np.maximum(*(_around(-step) for step in steps))
     margin = np.where(np.isfinite(margin), margin, np.inf)
-    row, column = np.nonzero(widened(lit.any(axis=-1)))
+    row, column = np.nonzero(widened(np.asarray(lit.any(axis=-1))))
     near, margin = np.ones(len(row), dtype=np.bool_), margin[row, column]
     for place, count in ((x, survey.probe.ccd.shape[1]), (y, survey.probe.ccd.shape[0])):
         least, most = -_around(-place)[row, column], _around(place)[row, column]
@@ -106,7 +108,7 @@ def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> tuple[Arra
     row, column = row[near], column[near]
     low = np.stack([column, row], axis=1).astype(np.float64)
     cell = row * lit.shape[1] + column
-    return np.full(len(row), number), cell, scale[row, column], low, lit[row, column]
+    return Squares(np.full(len(row), number), cell, scale[row, column], low, lit[row, column], 1.0)
 
 
 def _complete(lit: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -127,7 +129,7 @@ def _complete(lit: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 def _plain(
     probe: Probe, names: Array, pieces: Pieces, grids: list[Sheet], patched: tuple[FloatArray, ...]
 ) -> npt.NDArray[np.bool_]:
-    """Pieces that are whole cells between nodes with neighbours enough, and the rays in their middle agree."""
+    """Pieces that are whole cells with neighbours enough, where the rays in the middle agree."""
     plain = pieces.whole
     middle = np.full((len(plain), 2), np.nan)
     for n, (grid, coefficients) in enumerate(zip(grids, patched, strict=True)):
@@ -145,7 +147,7 @@ def _plain(
     with np.errstate(invalid="ignore"):
         off = np.hypot(here.x - middle[arrived, 0], here.y - middle[arrived, 1])
     sure = np.zeros(len(plain), dtype=np.bool_)
-    sure[arrived[(off < POOR) & (found == names[pieces.wave[arrived]])]] = True
+    sure[arrived[(off < MIDDLE) & (found == names[pieces.wave[arrived]])]] = True
     return sure
 
 
@@ -169,10 +171,8 @@ def _fits(
     return tables
 
 
-def _fitted(
-    probe: Probe, names: Array, pieces: Pieces, bases: list[float]
-) -> list[tuple[Fit, FloatArray]]:
-    """Fits to rays that start inside the pieces, one table for each sheet, and what they are off in pixels."""
+def _fitted(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> list[tuple[Fit, FloatArray]]:
+    """Fits to rays that start inside the pieces, a table for each sheet, and what rays are off."""
     units, owner = np.unique(np.stack([pieces.wave, pieces.cell]), axis=1, return_inverse=True)
     owner = owner.ravel()
     at, low, high = places(pieces, owner, units.shape[1])

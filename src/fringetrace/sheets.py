@@ -317,8 +317,7 @@ def caustics(
             direction, reach = arrival, last
         across = np.stack(_across(direction), axis=-2)
         start, turned = (
-            np.einsum("...ij,...kj->...ik", across, slopes(f))
-            for f in (way[:, :, leg], direction)
+            np.einsum("...ij,...kj->...ik", across, slopes(f)) for f in (way[:, :, leg], direction)
         )
         known = np.isfinite(start).all(axis=(-1, -2)) & np.isfinite(turned).all(axis=(-1, -2))
         start[~known] = np.eye(2)
