@@ -61,7 +61,7 @@ class Pieces:
     @property
     def whole(self) -> npt.NDArray[np.bool_]:
         """Which are all of their cell."""
-        return ~self.cut & (self.high - self.low == 1.0).all(axis=1)
+        return np.asarray(~self.cut & (self.high - self.low == 1.0).all(axis=1))
 
     @property
     def lines(self) -> FloatArray:
@@ -98,14 +98,21 @@ class Squares:
 
     def part(self, rows: Array) -> Squares:
         """Some of them."""
-        columns = (self.wave, self.cell, self.scale, self.low, self.lit)
-        return Squares(*(column[rows] for column in columns), size=self.size)
+        return Squares(
+            self.wave[rows], self.cell[rows], self.scale[rows], self.low[rows], self.lit[rows], self.size
+        )
 
     @staticmethod
     def joined(parts: list[Squares]) -> Squares:
         """One table of several of a size, at least one."""
-        columns = zip(*((p.wave, p.cell, p.scale, p.low, p.lit) for p in parts), strict=True)
-        return Squares(*(np.concatenate(column) for column in columns), size=parts[0].size)
+        return Squares(
+            wave=np.concatenate([part.wave for part in parts]),
+            cell=np.concatenate([part.cell for part in parts]),
+            scale=np.concatenate([part.scale for part in parts]),
+            low=np.concatenate([part.low for part in parts]),
+            lit=np.concatenate([part.lit for part in parts]),
+            size=parts[0].size,
+        )
 
 
 def _ends(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, goal: float) -> FloatArray:
@@ -222,9 +229,9 @@ def _bent(probe: Probe, squares: Squares, names: Array, last: bool) -> tuple[Pie
         begin, end = np.moveaxis(chord, 1, 0)
         chord = np.concatenate([np.stack([begin, middle], axis=1), np.stack([middle, end], axis=1)])
         owner = np.tile(owner, 2)
-    owner, chord, level = (np.concatenate(column) for column in zip(*found, strict=True))
+    owner, chord, halvings = (np.concatenate(column) for column in zip(*found, strict=True))
     good = ~failed[owner]
-    return _strips(squares, axis, owner[good], chord[good], level[good]), failed
+    return _strips(squares, axis, owner[good], chord[good], halvings[good]), failed
 
 
 def _strips(squares: Squares, axis: Array, owner: Array, chord: FloatArray, level: Array) -> Pieces:
@@ -251,7 +258,8 @@ def _strips(squares: Squares, axis: Array, owner: Array, chord: FloatArray, leve
         which = np.flatnonzero(np.isfinite(limit) & squares.lit[:, corner])
         low, high = squares.low[which], squares.low[which] + squares.size
         (high if corner == 0 else low)[np.arange(len(which)), axis[which]] = limit[which]
-        which, low, high = (column[(high > low).all(axis=1)] for column in (which, low, high))
+        there = (high > low).all(axis=1)
+        which, low, high = which[there], low[there], high[there]
         blank = np.full((len(which), 2, 2), np.nan)
         parts.append(Pieces(squares.wave[which], squares.cell[which], low, high, blank))
     return Pieces.joined(parts)
