@@ -82,7 +82,7 @@ def test_a_corner_inside_a_cell_is_found_by_quartering():
     mesh = shapes.plate(1.07 * mm, 1.07 * mm).moved((0.4 * mm, 0.4 * mm, 0))
     ((wave, region),) = regions.waves(probes.survey(lit(mesh, (5, 5))))
     assert abs(wave.amplitude) == pytest.approx(1.0, rel=ROUNDING)
-    assert region.pieces[:, 2].min() == 0.5**outlines.DEPTH
+    assert (region.pieces[:, 2] - region.pieces[:, 0]).min() == 0.5**outlines.DEPTH
     # each quartering of the four corners leaves a few pieces, not all of the edge
     assert len(region.pieces) < 4 * 4 * (outlines.DEPTH + 2)
 
@@ -92,7 +92,7 @@ def test_a_straight_edge_costs_one_piece_a_cell():
     found = list(regions.waves(probes.survey(lit(step))))
     assert len(found) == 2
     for _, region in found:
-        assert (region.pieces[:, 2] == 1.0).all()
+        assert (region.pieces[:, 2:4] - region.pieces[:, :2] == 1.0).all()
 
 
 def test_parts_of_the_paths_bring_their_part_of_the_light():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,8 @@ INSIDE = 0.02
 RANK = 1e-8
 # Degree of the polynomials whose slopes give the Jacobian, one more than cubic patches resolve.
 DEGREE = 5
+# Between rays is no more than this part of what half of them span.
+NEAR = 0.5
 # Fewer rays do not tell a Jacobian.
 FEWEST = 6
 # Powers of s in the Legendre polynomials of 2 s - 1.
@@ -85,10 +88,10 @@ class Fit:
         return np.asarray(np.einsum("nfi,ni->nf", lines, s), dtype=np.float64)
 
     def drawn(self, ends: FloatArray, owner: Array, most: int) -> FloatArray:
-        """Segments (m, 4) on the CCD of lines (n, 2, 2) on the beam's grid, a pixel long, or `most` a line."""
+        """Segments (m, 4) on the CCD of lines (n, 2, 2) on the beam's grid, a pixel long, `most` each."""
         begin, end = np.moveaxis(ends, 1, 0)
         stops = [self.pixels(begin + f * (end - begin), owner) for f in (0.0, 0.5, 1.0)]
-        length = sum(np.linalg.norm(b - a, axis=1) for a, b in zip(stops[:-1], stops[1:], strict=True))
+        length = sum(np.linalg.norm(b - a, axis=1) for a, b in pairwise(stops))
         count = np.clip(np.ceil(length), 1, most).astype(np.int64)
         line = np.repeat(np.arange(len(count)), count)
         step = np.arange(len(line)) - np.repeat(np.cumsum(count) - count, count)
@@ -109,7 +112,9 @@ def _trapezoids(pieces: Pieces) -> tuple[Array, Array, FloatArray, FloatArray, F
     above = (order[:, 0] == 0) != (axis == 1)  # lit on the left
     bottom = np.where((cut & above)[:, None], height, floor[:, None])
     top = np.where((cut & ~above)[:, None], height, roof[:, None])
-    parts = [(rows, axis, np.where(cut[:, None], ends, np.stack([least, most], axis=1)), bottom, top)]
+    parts: list[tuple[Array, ...]] = [
+        (rows, axis, np.where(cut[:, None], ends, np.stack([least, most], axis=1)), bottom, top)
+    ]
     # beside a chord that does not reach from end to end, all is lit or nothing
     a, b, c = pieces.lines.T
     for begin, end in ((least, ends[:, 0]), (ends[:, 1], most)):
@@ -117,8 +122,8 @@ def _trapezoids(pieces: Pieces) -> tuple[Array, Array, FloatArray, FloatArray, F
         middle[rows, axis], middle[rows, across] = 0.5 * (begin + end), 0.5 * (floor + roof)
         lit = np.flatnonzero(cut & (a * middle[:, 0] + b * middle[:, 1] > c))
         wide = np.stack([begin, end], axis=1)
-        flat = (np.repeat(level[lit, None], 2, axis=1) for level in (floor, roof))
-        parts.append((lit, axis[lit], wide[lit], *flat))
+        bottom, top = (np.repeat(level[lit, None], 2, axis=1) for level in (floor, roof))
+        parts.append((lit, axis[lit], wide[lit], bottom, top))
     piece, axis, along, bottom, top = (np.concatenate(column) for column in zip(*parts, strict=True))
     kept = (along[:, 1] > along[:, 0]) & ((top - bottom).max(axis=1) > 0.0)
     return piece[kept], axis[kept], along[kept], bottom[kept], top[kept]
@@ -183,8 +188,8 @@ def places(pieces: Pieces, owner: Array, count: int) -> tuple[FloatArray, FloatA
 
 def fitted(
     at: FloatArray, low: FloatArray, high: FloatArray, ray: Array, arrived: Arrivals, amplitude: ComplexArray,
-    base: float,
-) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_]]:  # fmt: skip
+    base: float, shape: tuple[int, int],
+) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_], FloatArray]:  # fmt: skip
     """Patches of a sheet by least squares.
 
     Parameters
@@ -199,6 +204,8 @@ def fitted(
     amplitude : (m,) complex128
     base : float, metres
         Paths are fitted less this.
+    shape : (rows, columns)
+        Of the CCD.
 
     Returns
     -------
@@ -207,35 +214,43 @@ def fitted(
     turns : (n, 2) int64
         Caustics passed where J < 0 and where J > 0.
     good : (n,) bool
-        Patches that enough rays arrived of.
+        Patches that enough rays arrived of, some of them near the CCD.
+    off : (n,) float64, pixels
+        What the rays are off the patches, root mean square.
     """
     count = len(at)
-    known = np.zeros(count * RAYS, dtype=np.bool_)
-    known[ray] = True
-    known = known.reshape(count, RAYS)
+    known = np.isin(np.arange(count * RAYS), ray).reshape(count, RAYS)
     good = known.sum(axis=1) >= FEWEST
     # any other ray of the patch stands in for one that is missing, without weight
-    row = np.zeros(count * RAYS, dtype=np.int64)
-    row[ray] = np.arange(len(ray))
-    row = row.reshape(count, RAYS)
+    number = np.zeros(count * RAYS, dtype=np.int64)
+    number[ray] = np.arange(len(ray))
+    row: Array = number.reshape(count, RAYS)
     row = np.where(known, row, row[np.arange(count), np.argmax(known, axis=1)][:, None])
+    good &= _near(arrived.x[row], shape[1]) & _near(arrived.y[row], shape[0]) if len(ray) else False
     coefficients, turns = np.zeros((count, 6, 4, 4)), np.zeros((count, 2), dtype=np.int64)
+    off = np.zeros(count)
     chosen = np.flatnonzero(good)
     for some in np.split(chosen, range(CHUNK, len(chosen), CHUNK)):
         if len(some):
             size = (high - low)[some]
             place = (at[some] - low[some, None]) / size[:, None]
-            coefficients[some], turns[some] = _patches(
+            coefficients[some], turns[some], off[some] = _patches(
                 place, np.sqrt(size.prod(axis=1)), known[some], row[some], arrived, amplitude, base
             )
-    return coefficients, turns, good
+    return coefficients, turns, good, off
+
+
+def _near(x: FloatArray, count: int) -> npt.NDArray[np.bool_]:
+    """Whether rays (n, RAYS) span some of the pixels from 0 to `count`, or are near it."""
+    least, middle, most = (f(x, axis=1) for f in (np.min, np.median, np.max))
+    return np.asarray((least - NEAR * (middle - least) < count) & (most + NEAR * (most - middle) > 0.0))
 
 
 def _patches(
     place: FloatArray, root: FloatArray, known: Array, row: Array, arrived: Arrivals,
     amplitude: ComplexArray, base: float,
-) -> tuple[FloatArray, npt.NDArray[np.int64]]:  # fmt: skip
-    """Coefficients and turns of patches; `root` of their part of a cell, `row` of their rays."""
+) -> tuple[FloatArray, npt.NDArray[np.int64], FloatArray]:  # fmt: skip
+    """Coefficients, turns, residuals; `root` of the part of a cell that patches are, `row` of their rays."""
     (s, slope_s), (t, slope_t) = (_legendre(2.0 * u - 1.0) for u in np.moveaxis(place, -1, 0))
     i, j = (index.ravel() for index in np.indices((DEGREE + 1, DEGREE + 1)))
     i, j = i[(low := i + j <= DEGREE)], j[low]
@@ -243,7 +258,8 @@ def _patches(
     along = np.stack([slope_s[..., i] * t[..., j], s[..., i] * slope_t[..., j]], axis=2)
 
     def slopes(values: FloatArray) -> FloatArray:
-        return np.einsum("nrkp,npv->nrkv", along, fine @ (values * known[..., None]))
+        found = np.einsum("nrkp,npv->nrkv", along, fine @ (values * known[..., None]))
+        return np.asarray(found, dtype=np.float64)
 
     x, y, w = arrived.x[row], arrived.y[row], arrived.length[row] - base
     steps = slopes(np.stack([x, y], axis=-1))
@@ -251,7 +267,10 @@ def _patches(
     light = amplitude[row] * root[:, None]
     values = np.stack([x, y, w, area, light.real, light.imag], axis=-1) * known[..., None]
     cubic = (s[..., :4, None] * t[..., None, :4]).reshape(*s.shape[:2], 16)
-    found = np.linalg.pinv(cubic * known[..., None], rcond=RANK) @ values
+    cubic *= known[..., None]
+    found = np.linalg.pinv(cubic, rcond=RANK) @ values
+    left = (cubic @ found - values)[..., :2]
+    off = np.sqrt((left**2).sum(axis=(1, 2)) / known.sum(axis=1))
     found = np.swapaxes(found, 1, 2).reshape(-1, 6, 4, 4)
     turns = np.zeros((len(x), 2), dtype=np.int64)
     if arrived.way is not None:
@@ -261,7 +280,7 @@ def _patches(
             best = np.argmax(size, axis=1)
             surest = np.arange(len(best)), best
             turns[:, branch] = np.where(size[surest] > 0.0, passed[surest], 0)
-    return POWERS.T @ found @ POWERS, turns
+    return POWERS.T @ found @ POWERS, turns, off
 
 
 def _legendre(x: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -272,4 +291,4 @@ def _legendre(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     slope = np.zeros((DEGREE + 1, DEGREE + 1))
     for k in range(1, DEGREE + 1):
         slope[:k, k] = 2.0 * legendre.legder(np.eye(DEGREE + 1)[k])[:k]
-    return value, np.asarray(value @ slope, dtype=np.float64)
+    return np.asarray(value, dtype=np.float64), np.asarray(value @ slope, dtype=np.float64)

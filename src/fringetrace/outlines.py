@@ -61,7 +61,7 @@ class Pieces:
     @property
     def whole(self) -> npt.NDArray[np.bool_]:
         """Which are all of their cell."""
-        return ~self.cut & (self.high - self.low == 1.0).all(axis=1)
+        return np.asarray(~self.cut & (self.high - self.low == 1.0).all(axis=1))
 
     @property
     def lines(self) -> FloatArray:
@@ -98,8 +98,21 @@ class Squares:
 
     def part(self, rows: Array) -> Squares:
         """Some of them."""
-        columns = (self.wave, self.cell, self.scale, self.low, self.lit)
-        return Squares(*(column[rows] for column in columns), self.size)
+        return Squares(
+            self.wave[rows], self.cell[rows], self.scale[rows], self.low[rows], self.lit[rows], self.size
+        )
+
+    @staticmethod
+    def joined(parts: list[Squares]) -> Squares:
+        """One table of several of a size, at least one."""
+        return Squares(
+            wave=np.concatenate([part.wave for part in parts]),
+            cell=np.concatenate([part.cell for part in parts]),
+            scale=np.concatenate([part.scale for part in parts]),
+            low=np.concatenate([part.low for part in parts]),
+            lit=np.concatenate([part.lit for part in parts]),
+            size=parts[0].size,
+        )
 
 
 def _ends(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, goal: float) -> FloatArray:
@@ -216,9 +229,9 @@ def _bent(probe: Probe, squares: Squares, names: Array, last: bool) -> tuple[Pie
         begin, end = np.moveaxis(chord, 1, 0)
         chord = np.concatenate([np.stack([begin, middle], axis=1), np.stack([middle, end], axis=1)])
         owner = np.tile(owner, 2)
-    owner, chord, level = (np.concatenate(column) for column in zip(*found, strict=True))
+    owner, chord, halvings = (np.concatenate(column) for column in zip(*found, strict=True))
     good = ~failed[owner]
-    return _strips(squares, axis, owner[good], chord[good], level[good]), failed
+    return _strips(squares, axis, owner[good], chord[good], halvings[good]), failed
 
 
 def _strips(squares: Squares, axis: Array, owner: Array, chord: FloatArray, level: Array) -> Pieces:
@@ -245,7 +258,8 @@ def _strips(squares: Squares, axis: Array, owner: Array, chord: FloatArray, leve
         which = np.flatnonzero(np.isfinite(limit) & squares.lit[:, corner])
         low, high = squares.low[which], squares.low[which] + squares.size
         (high if corner == 0 else low)[np.arange(len(which)), axis[which]] = limit[which]
-        which, low, high = (column[(high > low).all(axis=1)] for column in (which, low, high))
+        there = (high > low).all(axis=1)
+        which, low, high = which[there], low[there], high[there]
         blank = np.full((len(which), 2, 2), np.nan)
         parts.append(Pieces(squares.wave[which], squares.cell[which], low, high, blank))
     return Pieces.joined(parts)
@@ -260,8 +274,19 @@ def _beside(squares: Squares, chosen: Array) -> npt.NDArray[np.bool_]:
     return np.isin(number, (number[chosen][:, None] + steps).ravel())
 
 
-def _quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
-    """Four quarters of squares, with which of their corners are lit."""
+def quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
+    """Four quarters of squares, with which of their corners are lit.
+
+    Parameters
+    ----------
+    probe : Probe
+    names : (waves,) uint64
+    squares : Squares
+
+    Returns
+    -------
+    Squares
+    """
     low, size = squares.low, squares.size
     nodes = np.zeros((len(low), 3, 3), dtype=np.bool_)  # [row, column]
     nodes[:, 0, 0], nodes[:, 0, 2], nodes[:, 2, 2], nodes[:, 2, 0] = squares.lit.T
@@ -272,8 +297,10 @@ def _quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
     corner = [np.stack([nodes[:, j, i], nodes[:, j, i + 1], nodes[:, j + 1, i + 1], nodes[:, j + 1, i]], 1)
               for j in (0, 1) for i in (0, 1)]  # fmt: skip
     place = [low + 0.5 * size * np.array((i, j)) for j in (0, 1) for i in (0, 1)]
-    wave, cell, scale = (np.tile(column, 4) for column in (squares.wave, squares.cell, squares.scale))
-    return Squares(wave, cell, scale, np.concatenate(place), np.concatenate(corner), 0.5 * size)
+    return Squares(
+        wave=np.tile(squares.wave, 4), cell=np.tile(squares.cell, 4), scale=np.tile(squares.scale, 4),
+        low=np.concatenate(place), lit=np.concatenate(corner), size=0.5 * size,
+    )  # fmt: skip
 
 
 def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
@@ -285,7 +312,6 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
     names : (waves,) uint64
         Of the sequences that `squares.wave` counts.
     squares : Squares
-        Cells, of size 1.
 
     Returns
     -------
@@ -293,8 +319,9 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
         Of what is lit, in no order.
     """
     done = []
-    for depth in range(DEPTH + 1):
-        last = depth == DEPTH
+    finest = 0.5**DEPTH
+    while True:
+        last = squares.size <= finest
         crossed = (squares.lit != np.roll(squares.lit, -1, axis=1)).sum(axis=1)
         once = np.flatnonzero(crossed == 2)
         some = squares.part(once)
@@ -309,11 +336,11 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
         done.append(Pieces(full.wave, full.cell, full.low, full.low + squares.size, blank))
         if last or not rest.any():
             break
-        squares = _quarters(probe, names, squares.part(rest))
+        squares = quarters(probe, names, squares.part(rest))
     return Pieces.joined(done)
 
 
-def widened(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+def widened(mask: Array) -> npt.NDArray[np.bool_]:
     """A mask (rows, columns) and all its neighbours."""
     rows, columns = mask.shape
     wide = np.pad(mask, 1)

@@ -129,8 +129,9 @@ def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
     """
     probe = survey.probe
     ccd, beam = probe.ccd, probe.beam
-    found, squares = [], []
-    for index in np.flatnonzero(~survey.curved):
+    found: list[Wave] = []
+    squares = []
+    for index in np.flatnonzero(~survey.curved).tolist():
         row = int(survey.rows[index][0])
         node = int(survey.paths.ray[row])
         start = np.array([node % survey.shape[1], node // survey.shape[1]], dtype=np.float64)
@@ -142,25 +143,25 @@ def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
     if not found:
         return
     names = np.array([wave.name for wave in found], dtype=np.uint64)
-    columns = (np.concatenate(column) for column in zip(*squares, strict=True))
-    pieces = cut(probe, names, Squares(*columns, 1.0))
+    pieces = cut(probe, names, Squares.joined(squares))
     order = np.lexsort((pieces.cell, pieces.wave))
     cuts = np.searchsorted(pieces.wave[order], np.arange(len(found) + 1))
-    for index, wave in enumerate(found):
-        mine = order[cuts[index] : cuts[index + 1]]
+    for n, wave in enumerate(found):
+        mine = order[cuts[n] : cuts[n + 1]]
         if len(mine):
             yield wave, _region(pieces.part(mine), beam)
 
 
-def _squares(survey: Survey, index: int, wave: Wave, number: int) -> tuple[Array, ...]:
-    """Cells that a wave may light, towards the CCD; columns of `Squares`."""
+def _squares(survey: Survey, index: int, wave: Wave, number: int) -> Squares:
+    """Cells that a wave may light, towards the CCD."""
     lit = survey.corners(index)
-    row, column = np.nonzero(widened(lit.any(axis=-1)))
+    row, column = np.nonzero(widened(np.asarray(lit.any(axis=-1))))
     near = _near(wave, row, column, survey.probe.ccd)
     row, column = row[near], column[near]
     scale = np.full(len(row), np.linalg.norm(wave.matrix, 2))
     low = np.stack([column, row], axis=1).astype(np.float64)
-    return np.full(len(row), number), row * lit.shape[1] + column, scale, low, lit[row, column]
+    cell = row * lit.shape[1] + column
+    return Squares(np.full(len(row), number), cell, scale, low, lit[row, column], 1.0)
 
 
 def _region(pieces: Pieces, beam: Beam) -> Region:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.fits import Fit, fitted, places
-from fringetrace.outlines import PIXEL, STRAIGHT, Pieces, Squares, cut, widened
+from fringetrace.outlines import PIXEL, STRAIGHT, Pieces, Squares, cut, quarters, widened
 from fringetrace.probes import Probe, Survey, profile
 from fringetrace.scene import CCD
 from fringetrace.sheets import (
@@ -26,6 +26,12 @@ from fringetrace.waves import Array, FloatArray
 
 # Segments that an edge within a cell is drawn with, at most.
 SEGMENTS = 64
+# Rays this many pixels off in the middle of a patch tell that it is none.
+MIDDLE = 1e-4
+# Fits that rays are so many off are poor: samples fall through the seams; cells are quartered so often;
+POOR, QUARTERS = 1e-5, 3
+# where they are still so many off, light is going everywhere and nothing is there.
+LOST = 0.1
 # Neighbours in a row that differences of fourth order need.
 STENCIL = 5
 
@@ -45,29 +51,25 @@ def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
         Their edges, and the rim of the beam: x, y of either end.
     """
     probe = survey.probe
-    which = np.flatnonzero(survey.curved)
-    if len(which) == 0:
+    which = np.flatnonzero(survey.curved).tolist()
+    if not which:
         return [], np.empty((0, 4))
     grids = [_grid(survey, index) for index in which]
-    squares = [
-        _squares(survey, index, grid, n) for n, (index, grid) in enumerate(zip(which, grids, strict=True))
-    ]
-    columns = (np.concatenate(column) for column in zip(*squares, strict=True))
+    cells = Squares.joined([_squares(survey, index, grids[n], n) for n, index in enumerate(which)])
     names = survey.names[which]
-    pieces = cut(probe, names, Squares(*columns, 1.0))
-    order = np.lexsort((pieces.cell, pieces.wave))
-    pieces = pieces.part(order)
+    pieces = cut(probe, names, cells)
+    pieces = pieces.part(np.lexsort((pieces.cell, pieces.wave)))
     coefficients, areas = zip(*(patches(grid) for grid in grids), strict=True)
-    plain = _plain(pieces, grids, coefficients)
-    fits = _fits(probe, names, pieces.part(~plain), [grid.base for grid in grids])
+    plain = _plain(probe, names, pieces, grids, coefficients)
+    fits = _fits(probe, names, cells, pieces.part(~plain), [grid.base for grid in grids])
     found, drawn = [], [np.empty((0, 4))]
     for n, (grid, fit) in enumerate(zip(grids, fits, strict=True)):
         mine = pieces.part(plain & (pieces.wave == n))
         row, column = np.divmod(mine.cell, probe.beam.shape[1])
         turns = branch_turns(grid.turns, areas[n])[row, column]
         patched = Fit(mine, np.arange(len(row)), coefficients[n][row, column], turns, mine.low, mine.high)
-        found.append(_together([patched, fit], grid.base, probe.ccd))
-        drawn += [_drawn(part, probe) for part in (patched, fit)]
+        found.append(_together([patched, *fit], grid.base, probe.ccd))
+        drawn += [_drawn(part, probe) for part in (patched, *fit)]
     return found, np.concatenate(drawn)
 
 
@@ -81,27 +83,32 @@ def _grid(survey: Survey, index: int) -> Sheet:
 
 
 def _around(values: FloatArray) -> FloatArray:
-    """Largest of the 4 x 4 nodes around each cell; -inf where none is known."""
+    """Largest of the corners of each cell, or else of the nodes around it; -inf where none is known."""
     known = np.where(np.isfinite(values), values, -np.inf)
-    return largest(np.pad(known, 1, constant_values=-np.inf), 4)
+    corner, near = largest(known, 2), largest(np.pad(known, 1, constant_values=-np.inf), 4)
+    return np.where(np.isfinite(corner), corner, near)
 
 
-def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> tuple[Array, ...]:
-    """Cells that a sheet may light, towards the CCD; columns of `Squares`."""
+def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> Squares:
+    """Cells that a sheet may light, towards the CCD."""
     lit = survey.corners(index)
     x, y = grid.x, grid.y
     steps = [np.hypot(differences(x, axis), differences(y, axis)) for axis in (0, 1)]
     scale = np.maximum(*(_around(step) for step in steps))
-    most = float(scale.max())
-    scale = np.where(scale > 0.0, scale, most if most > 0.0 else PIXEL / STRAIGHT)
-    near = widened(lit.any(axis=-1))
+    # light that goes past the CCD's plane is spread without bounds
+    scale = np.minimum(np.where(scale > 0.0, scale, PIXEL / STRAIGHT), max(survey.probe.ccd.shape))
+    # the least step: next to where light goes past the CCD's plane there are large ones
+    margin = -np.maximum(*(_around(-step) for step in steps))
+    margin = np.where(np.isfinite(margin), margin, np.inf)
+    row, column = np.nonzero(widened(np.asarray(lit.any(axis=-1))))
+    near, margin = np.ones(len(row), dtype=np.bool_), margin[row, column]
     for place, count in ((x, survey.probe.ccd.shape[1]), (y, survey.probe.ccd.shape[0])):
-        low, high = -_around(-place), _around(place)
-        near &= (high + 2.0 * scale > 0.0) & (low - 2.0 * scale < count)
-    row, column = np.nonzero(near)
+        least, most = -_around(-place)[row, column], _around(place)[row, column]
+        near &= (most + margin > 0.0) & (least - margin < count)
+    row, column = row[near], column[near]
     low = np.stack([column, row], axis=1).astype(np.float64)
     cell = row * lit.shape[1] + column
-    return np.full(len(row), number), cell, scale[row, column], low, lit[row, column]
+    return Squares(np.full(len(row), number), cell, scale[row, column], low, lit[row, column], 1.0)
 
 
 def _complete(lit: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -119,40 +126,72 @@ def _complete(lit: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     return complete
 
 
-def _plain(pieces: Pieces, grids: list[Sheet], coefficients: tuple[FloatArray, ...]) -> npt.NDArray[np.bool_]:
-    """Pieces that are whole cells between nodes with neighbours enough."""
+def _plain(
+    probe: Probe, names: Array, pieces: Pieces, grids: list[Sheet], patched: tuple[FloatArray, ...]
+) -> npt.NDArray[np.bool_]:
+    """Pieces that are whole cells with neighbours enough, where the rays in the middle agree."""
     plain = pieces.whole
-    for n, (grid, known) in enumerate(zip(grids, coefficients, strict=True)):
+    middle = np.full((len(plain), 2), np.nan)
+    for n, (grid, coefficients) in enumerate(zip(grids, patched, strict=True)):
         complete = _complete(np.isfinite(grid.x))
         good = complete[:-1, :-1] & complete[:-1, 1:] & complete[1:, 1:] & complete[1:, :-1]
-        good &= np.isfinite(known).all(axis=(2, 3, 4))
+        good &= np.isfinite(coefficients).all(axis=(2, 3, 4))
         mine = pieces.wave == n
         plain[mine] &= good.ravel()[pieces.cell[mine]]
-    return plain
+        half = 0.5 ** np.arange(4)
+        middle[mine] = (half @ coefficients[:, :, :2] @ half).reshape(-1, 2)[pieces.cell[mine]]
+    rows = np.flatnonzero(plain)
+    paths, landed, found, _ = probe.paths(pieces.low[rows] + 0.5)
+    arrived = rows[paths.ray[landed]]
+    here = arrivals(paths, landed, probe.ccd)
+    with np.errstate(invalid="ignore"):
+        off = np.hypot(here.x - middle[arrived, 0], here.y - middle[arrived, 1])
+    sure = np.zeros(len(plain), dtype=np.bool_)
+    sure[arrived[(off < MIDDLE) & (found == names[pieces.wave[arrived]])]] = True
+    return sure
 
 
-def _fits(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> list[Fit]:
-    """Fits of the cells of pieces, one table for each sheet, to rays that start inside the pieces."""
+def _fits(
+    probe: Probe, names: Array, squares: Squares, pieces: Pieces, bases: list[float]
+) -> list[list[Fit]]:
+    """Fits of the cells of pieces, and of their quarters where need be; tables for each sheet."""
+    tables: list[list[Fit]] = [[] for _ in bases]
+    for level in range(QUARTERS + 1):
+        bad = np.zeros(len(squares.cell), dtype=np.bool_)
+        for n, (fit, off) in enumerate(_fitted(probe, names, pieces, bases)):
+            poor = off > (LOST if level == QUARTERS else POOR)
+            cells = np.unique(fit.pieces.cell[poor[fit.owner]])
+            bad |= (squares.wave == n) & np.isin(squares.cell, cells)
+            tables[n].append(fit.where(~poor))
+        if level == QUARTERS or not bad.any():
+            break
+        squares = quarters(probe, names, squares.part(bad))
+        squares = replace(squares, cell=np.arange(len(squares.cell)))
+        pieces = cut(probe, names, squares)
+    return tables
+
+
+def _fitted(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> list[tuple[Fit, FloatArray]]:
+    """Fits to rays that start inside the pieces, a table for each sheet, and what rays are off."""
     units, owner = np.unique(np.stack([pieces.wave, pieces.cell]), axis=1, return_inverse=True)
     owner = owner.ravel()
     at, low, high = places(pieces, owner, units.shape[1])
-    paths, rows, found, _ = probe.paths(at.reshape(-1, 2))
+    starts = at.reshape(-1, 2)
+    paths, rows, found, _ = probe.paths(starts)
     wanted = np.repeat(names[units[0]], at.shape[1])
     rows = rows[found == wanted[paths.ray[rows]]]
-    paths = replace(paths, amplitude=paths.amplitude * profile(probe.beam, at.reshape(-1, 2))[paths.ray])
-    sheet_of = units[0][paths.ray[rows] // at.shape[1]]
+    paths = replace(paths, amplitude=paths.amplitude * profile(probe.beam, starts)[paths.ray])
+    wave = units[0][paths.ray[rows] // at.shape[1]]
     fits = []
     for n, base in enumerate(bases):
-        mine = np.flatnonzero(units[0] == n)
-        part = pieces.wave == n
-        first = int(mine[0]) if len(mine) else 0
-        arrived = rows[sheet_of == n]
-        coefficients, turns, good = fitted(
-            at[mine], low[mine], high[mine], paths.ray[arrived] - first * at.shape[1],
-            arrivals(paths, arrived, probe.ccd), paths.amplitude[arrived], base,
+        mine = slice(*np.searchsorted(units[0], [n, n + 1]))
+        part, arrived = pieces.wave == n, rows[wave == n]
+        coefficients, turns, good, off = fitted(
+            at[mine], low[mine], high[mine], paths.ray[arrived] - mine.start * at.shape[1],
+            arrivals(paths, arrived, probe.ccd), paths.amplitude[arrived], base, probe.ccd.shape,
         )  # fmt: skip
-        own = owner[part] - first
-        fits.append(Fit(pieces.part(part), own, coefficients, turns, low[mine], high[mine]).where(good))
+        fit = Fit(pieces.part(part), owner[part] - mine.start, coefficients, turns, low[mine], high[mine])
+        fits.append((fit.where(good), off[good]))
     return fits
 
 

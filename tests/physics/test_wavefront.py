@@ -254,12 +254,13 @@ def test_two_mirrors_that_meet_overlap_or_leave_a_gap(angle):
 
 def lit_width(region):
     """Width of a region of a prism, in cells: its pieces are cut along the prism."""
-    s, size, a, b, c = region.pieces[:, [0, 2, 3, 4, 5]].T
+    s, t, to_s, to_t, a, b, c = region.pieces.T
+    size = to_s - s
     assert (abs(b) <= 1e-3 * size).all()
     with np.errstate(divide="ignore", invalid="ignore"):
         edge = np.clip(c / a, s, s + size)
     width = np.where(a > 0, s + size - edge, np.where(a < 0, edge - s, size))
-    return (width * size).sum()
+    return (width * (to_t - t)).sum()
 
 
 def test_the_regions_of_a_lattice_are_as_wide_as_rays_count():
