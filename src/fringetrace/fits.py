@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.outlines import Pieces, main_axis
+from fringetrace.probes import RIM
 from fringetrace.sheets import Arrivals, caustics
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
@@ -220,7 +221,7 @@ def fitted(
     """
     count = len(at)
     known = np.isin(np.arange(count * RAYS), ray).reshape(count, RAYS)
-    good = known.sum(axis=1) >= FEWEST
+    good = (known.sum(axis=1) >= FEWEST) & (high - low > RIM).all(axis=1)
     # any other ray of the patch stands in for one that is missing, without weight
     number = np.zeros(count * RAYS, dtype=np.int64)
     number[ray] = np.arange(len(ray))
