@@ -71,6 +71,7 @@ class Cells:
     folded: npt.NDArray[np.bool_]
     turns: npt.NDArray[np.int64]
     base: float
+    place: npt.NDArray[np.int64]
 
 
 def differences(values: FloatArray, axis: int) -> FloatArray:
@@ -332,7 +333,7 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
         signs[leaves[leaves[:, raster.SIGN] == sign, raster.CELL].astype(np.int64), branch] = True
     folded[leaves[leaves[:, raster.SIGN] == 0.0, raster.CELL].astype(np.int64)] = True
     folded |= signs.all(axis=1)
-    return Cells(chosen, leaves, folded, _turns(sheet.turns, area)[whole], sheet.base)
+    return Cells(chosen, leaves, folded, _turns(sheet.turns, area)[whole], sheet.base, np.argwhere(whole))
 
 
 def _largest(grid: npt.NDArray[np.int64], size: int) -> npt.NDArray[np.int64]:
@@ -382,24 +383,25 @@ def fields(
     ValueError
         If the source is no beam, or there is no CCD, or the wavelength is none.
     """
+    from fringetrace import folds
+
     ccd, beam = checked(paths)
     period = checked_wavelength(wavelength)
     if not half_wave_loss:
         paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
-    parts = [(cells(sheet, ccd), sheet.base) for sheet in sheets(paths)]
     unit = beam.area / ccd.pitch**2
+    parts = [
+        (
+            folds.folds(part.coefficients, part.leaves, part.folded, part.turns, part.place, period, unit),
+            np.exp(2j * np.pi * np.fmod(part.base, period) / period),
+        )
+        for part in (cells(sheet, ccd) for sheet in sheets(paths))
+    ]
 
     def light(points: Samples, slope: FloatArray) -> ComplexArray:
-        from fringetrace import raster
-
         total = points.blank()
-        for part, base in parts:
-            field = points.blank()
-            raster.spread(
-                part.leaves, part.coefficients, part.folded, part.turns, unit, period, points.top,
-                points.columns, points.first, points.x, points.y, field, slope,
-            )  # fmt: skip
-            total += field * np.exp(2j * np.pi * np.fmod(base, period) / period)
+        for part, phase in parts:
+            total += folds.light(part, points, slope) * phase
         return total
 
     rows, columns = ccd.shape
