@@ -29,13 +29,15 @@ from fringetrace.raster import (
 )  # fmt: skip
 from fringetrace.waves import ComplexArray, FloatArray
 
-# Airy widths from a fold: how far into the dark (where Ai is 1e-6), and how far two branches are uniform
-# (beyond, they are off by 5/72 of 2/3 z^(3/2)).
-DARK, LIT = 7.0, 12.0
+# Airy widths from a fold: how far into the dark (where Ai is 1e-6), and how far to the lit side. There the
+# branches as rays take them are corrected from CLEAR on, by less and less.
+DARK, CLEAR, LIT = 7.0, 6.0, 12.0
 # Where a cusp or an edge is near, a part of the nodes' widths will do.
 SCALES = np.array([1.0, 0.5, 0.25])
 # A cell has a seed of a fold in each of so many squares a side; it stretches so many cells either way.
 SQUARES, STRETCH = 3, 0.75
+# A branch diverges as z^(-1/4) at its own fold: there it is not corrected for another.
+SHARED = 0.125
 # Places on the grid so many cells apart are one.
 SAME = 1e-4
 # The slope of the first fringe beside a fold is that of two waves at this z.
@@ -44,8 +46,9 @@ FIRST = 2.0
 # half a stretch in pixels, scale of the nodes, gradient of the path.
 P, Q, X, Y, NORMAL_X, NORMAL_Y, WIDTH, REACH, SCALE, SLOPE_X, SLOPE_Y = range(11)
 # Columns of two branches at a sample: the sample, z, W, A, B, turns; foot on the fold; the two roots, and
-# how near to them a root is one of them; whether these count; the row before at this sample.
-SAMPLE, Z, WAY, RE_A, IM_A, RE_B, IM_B, TURNS, FOOT_P, FOOT_Q, P1, Q1, P2, Q2, NEAR, COUNTS, BEFORE = range(17)
+# how near to them a root is one of them; the row before at this sample; whether the row stands for both
+# branches, or how much of what it says beyond rays is added to them.
+SAMPLE, Z, WAY, RE_A, IM_A, RE_B, IM_B, TURNS, FOOT_P, FOOT_Q, P1, Q1, P2, Q2, NEAR, BEFORE, OWNS, PART = range(18)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +135,7 @@ def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
     grid = points.top, points.columns, points.first, points.x, points.y
     cells = sheet.coefficients, sheet.folded, sheet.turns, sheet.unit, sheet.period
     near = sheet.leaves[:, SIGN] == 0.0
-    rows, latest = np.empty((0, 17)), np.full(len(points.x), -1)
+    rows, latest = np.empty((0, 18)), np.full(len(points.x), -1)
     if len(slope):
         widen_beside(sheet.seeds, 2.0 * np.pi / sheet.period, *grid[:3], points.x, points.y, slope)
     elif len(sheet.seeds):
@@ -145,16 +148,20 @@ def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
     raster.spread(sheet.leaves[~near], *cells, *grid, field, slope)
     if near.any():
         spread(sheet.leaves[near], *cells, sheet.place, rows, latest, *grid, field, slope)
-    rows = rows[rows[:, COUNTS] == 1.0]
     np.add.at(field, rows[:, SAMPLE].astype(np.int64), np.sqrt(sheet.unit) * uniform(rows, sheet.period))
     return field
 
 
 def uniform(rows: FloatArray, period: float) -> ComplexArray:
-    """The field of two branches: the formula above."""
+    """The field of two branches by the formula above, or what it has beyond rays' (Airy's asymptotes)."""
     from scipy.special import airy
 
     ai, slope, _, _ = airy(-rows[:, Z])
+    z = np.maximum(rows[:, Z], CLEAR * 1e-3)
+    phase = 2.0 / 3.0 * z**1.5 - 0.25 * np.pi
+    beyond = np.where(rows[:, OWNS] == 1.0, 0.0, 1.0 / np.sqrt(np.pi))
+    ai = rows[:, PART] * (ai - beyond * np.cos(phase) / z**0.25)
+    slope = rows[:, PART] * (slope - beyond * np.sin(phase) * z**0.25)
     turn = np.fmod(rows[:, WAY], period) / period - 0.125 - 0.25 * rows[:, TURNS]
     value = (rows[:, RE_A] + 1j * rows[:, IM_A]) * ai + 1j * (rows[:, RE_B] + 1j * rows[:, IM_B]) * slope
     return np.asarray(np.sqrt(np.pi) * np.exp(2j * np.pi * turn) * value)
@@ -248,7 +255,7 @@ def widen_beside(seeds, wavenumber, top, columns, first, x, y, slope):
 @jit
 def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x, y, latest):
     """Two branches at each sample beside a fold, in the dark too: rows; `latest` of each sample."""
-    found = np.empty((1024, 17))
+    found = np.empty((1024, 18))
     count = 0
     rows = (len(first) - 1) // columns
     for seed in seeds:
@@ -268,7 +275,7 @@ def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x
                     if known(found, latest[k], p, q):
                         continue
                     if count == len(found):
-                        larger = np.empty((2 * count, 17))
+                        larger = np.empty((2 * count, 18))
                         larger[:count] = found
                         found = larger
                     found[count, SAMPLE], found[count, BEFORE] = k, latest[k]
@@ -311,22 +318,24 @@ def branches(seed, cells, index, lines, turns, wavenumber, p, q, x, y, row):
     if not there or z > LIT or not 0.3 < z / even < 3.0:
         return False
     row[Z : TURNS + 1] = np.array([z, way, a.real, a.imag, b.real, b.imag, float(passed)])
-    row[FOOT_P : COUNTS + 1] = np.array([p, q, p1, q1, p2, q2, near, 1.0])
+    row[FOOT_P : NEAR + 1] = np.array([p, q, p1, q1, p2, q2, near])
+    row[OWNS], row[PART] = (1.0, 1.0) if z < CLEAR else (0.0, (LIT - z) / (LIT - CLEAR))
     return True
 
 
 @jit
 def resolve(found, latest):
-    """Leave a branch that two folds part from others (near a cusp) to the nearer one."""
+    """A branch that two folds part from others (near a cusp) is the nearer one's, and corrected for the other."""
     for k in range(len(latest)):
         row = latest[k]
         while row >= 0:
             other = latest[k]
             while other >= 0:
-                if other != row and found[other, COUNTS] == 1.0 and found[row, Z] > found[other, Z]:
+                if found[other, OWNS] == 1.0 and found[row, Z] > found[other, Z]:
                     shared = owns(found[other], found[row, P1], found[row, Q1])
                     if shared or owns(found[other], found[row, P2], found[row, Q2]):
-                        found[row, COUNTS] = 0.0
+                        found[row, OWNS] = 0.0
+                        found[row, PART] *= 1.0 - np.exp(-SHARED * max(found[other, Z], 0.0) ** 3)
                 other = int(found[other, BEFORE])
             row = int(found[row, BEFORE])
 
@@ -342,7 +351,7 @@ def owns(row, p, q):
 def taken(found, row, p, q):
     """Whether a root is one of two that a row of its sample has."""
     while row >= 0:
-        if found[row, COUNTS] == 1.0 and owns(found[row], p, q):
+        if found[row, OWNS] == 1.0 and owns(found[row], p, q):
             return True
         row = int(found[row, BEFORE])
     return False
