@@ -14,6 +14,8 @@ from fringetrace.raster import patch, scalar
 # Airy widths that the waves next to a fold and in the dark are continued from. Nearer than the first, the
 # difference of two paths drowns in the error of either.
 NODES = np.array([0.3, 1.0, 2.0, 3.2])
+# They do if A is even to this factor: it rises towards another fold.
+EVEN = 1.2
 
 
 @part
@@ -159,9 +161,10 @@ def pair(cells, index, turns, wavenumber, p, q, across_p, across_q, bend, height
 
 @jit
 def continued(cells, index, turns, wavenumber, p, q, width, height):
-    """What `pair` finds, at any height, as the polynomial through `NODES` Airy widths."""
+    """What `pair` finds, at any height, as the polynomial through `NODES` widths: found, even, z, W, A, B, turns."""
     x, y, normal_x, normal_y, across_p, across_q, bend, _ = frame(cells, index, p, q)
     rate, way, a, b, passed = 0.0, 0.0, 0.0j, 0.0j, 0
+    least, most = np.inf, 0.0
     for i in range(len(NODES)):
         at = NODES[i] * width
         found, _, _, _, _, z, mean, one, other, passed = pair(
@@ -169,14 +172,15 @@ def continued(cells, index, turns, wavenumber, p, q, width, height):
             x + at * normal_x, y + at * normal_y,
         )  # fmt: skip
         if not found:
-            return False, 0.0, 0.0, 0.0j, 0.0j, 0
+            return False, False, 0.0, 0.0, 0.0j, 0.0j, 0
         weight = 1.0
         for j in range(len(NODES)):
             if j != i:
                 weight *= (height / width - NODES[j]) / (NODES[i] - NODES[j])
         rate += weight * z / at
+        least, most = min(least, abs(one)), max(most, abs(one))
         way, a, b = way + weight * mean, a + weight * one, b + weight * other
-    return rate > 0.0, rate * height, way, a, b, passed
+    return rate > 0.0, most <= EVEN * least, rate * height, way, a, b, passed
 
 
 @jit

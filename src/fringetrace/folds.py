@@ -33,9 +33,11 @@ from fringetrace.waves import ComplexArray, FloatArray
 # branches as rays take them are corrected from CLEAR on, by less and less.
 DARK, CLEAR, LIT = 7.0, 6.0, 12.0
 # Where a cusp or an edge is near, a part of the nodes' widths will do.
-SCALES = np.array([1.0, 0.5, 0.25])
+SCALES = np.array([1.0, 0.5, 0.25, 0.125, 0.0625, 0.03125])
 # A cell has a seed of a fold in each of so many squares a side; it stretches so many cells either way.
 SQUARES, STRETCH = 3, 0.75
+# A sample that lacks a node which its seed has tries again, so often, with nodes half as far.
+TRIES = 3
 # A branch diverges as z^(-1/4) at its own fold: there it is not corrected for another.
 SHARED = 0.125
 # Places on the grid so many cells apart are one.
@@ -197,8 +199,10 @@ def seeds(cells, index, turns, place, crossed, wavenumber):
             if not (width > 0.0 and stretch > 0.0):
                 continue
             for scale in SCALES:
-                there, _, _, _, _, _ = continued(cells, index, turns, wavenumber, p, q, width * scale, 0.0)
-                if there:
+                there, even, _, _, _, _, _ = continued(
+                    cells, index, turns, wavenumber, p, q, width * scale, 0.0
+                )
+                if there and even:
                     at = width * scale * NODES[0]
                     _, p1, q1, p2, q2, _, _, _, _, _ = pair(
                         cells, index, turns, wavenumber, p, q, across_p, across_q, bend, at,
@@ -310,7 +314,14 @@ def branches(seed, cells, index, lines, turns, wavenumber, p, q, x, y, row):
         there = there and within(index, lines, p1, q1) and within(index, lines, p2, q2)
         near = SAME
     else:
-        there, z, way, a, b, passed = continued(cells, index, turns, wavenumber, p, q, width, height)
+        there, z, way, a, b, passed = False, 0.0, 0.0, 0.0j, 0.0j, 0
+        for _ in range(TRIES):
+            there, _, z, way, a, b, passed = continued(
+                cells, index, turns, wavenumber, p, q, width, height
+            )
+            if there:
+                break
+            width *= 0.5
         p1, q1, p2, q2 = p, q, p, q
         near = 2.0 * np.sqrt(2.0 * NODES[0] * width / bend)
     even = height / seed[WIDTH]
