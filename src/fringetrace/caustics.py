@@ -46,9 +46,9 @@ def locate(index, p, q):
 
 
 @jit
-def follow(cells, index, p, q, sign, x, y):
-    """Root of the map at (x, y) with J of one sign, by Newton from (p, q) across cells: found, p, q."""
-    dp, dq, last = 0.0, 0.0, False
+def follow(cells, index, p, q, dp, dq, sign, x, y):
+    """Root of the map at (x, y) with J of one sign, by Newton from a step off a fold: found, p, q."""
+    last = False
     for _ in range(40):
         cell, s, t = locate(index, p + dp, q + dq)
         area = 0.0
@@ -101,7 +101,7 @@ def foot(cells, index, p, q, x, y):
 
 @jit
 def frame(cells, index, p, q):
-    """A fold: x, y; normal to its lit side; on the grid, direction across in which J grows; bend; stretch.
+    """A fold: x, y; normal to its lit side; direction across on the grid in which J grows; bend; stretch.
 
     Half of `bend` times the square of a step across on the grid is the distance from the fold in pixels;
     `stretch` is how many pixels a step along the fold takes.
@@ -142,10 +142,10 @@ def wave(cells, index, p, q):
 
 @jit
 def pair(cells, index, turns, wavenumber, p, q, across_p, across_q, bend, height, x, y):
-    """Two branches that a fold at (p, q) parts, at (x, y), `height` beyond it: found, both roots, z, W, A, B, turns."""
+    """Branches that a fold at (p, q) parts, at (x, y), `height` beyond: found, both roots, z, W, A, B, turns."""
     half = np.sqrt(2.0 * height / bend)
-    up, p1, q1 = follow(cells, index, p + half * across_p, q + half * across_q, 1.0, x, y)
-    down, p2, q2 = follow(cells, index, p - half * across_p, q - half * across_q, -1.0, x, y)
+    up, p1, q1 = follow(cells, index, p, q, half * across_p, half * across_q, 1.0, x, y)
+    down, p2, q2 = follow(cells, index, p, q, -half * across_p, -half * across_q, -1.0, x, y)
     if not (up and down):
         return False, p1, q1, p2, q2, 0.0, 0.0, 0.0j, 0.0j, 0
     way1, _, _, area1, amplitude1, cell1 = wave(cells, index, p1, q1)
@@ -161,7 +161,7 @@ def pair(cells, index, turns, wavenumber, p, q, across_p, across_q, bend, height
 
 @jit
 def continued(cells, index, turns, wavenumber, p, q, width, height):
-    """What `pair` finds, at any height, as the polynomial through `NODES` widths: found, even, z, W, A, B, turns."""
+    """`pair` at any height, as the polynomial through `NODES` widths: found, even, z, W, A, B, turns."""
     x, y, normal_x, normal_y, across_p, across_q, bend, _ = frame(cells, index, p, q)
     rate, way, a, b, passed = 0.0, 0.0, 0.0j, 0.0j, 0
     least, most = np.inf, 0.0

@@ -24,8 +24,26 @@ from fringetrace.caustics import NODES, airy_width, continued, foot, frame, loca
 from fringetrace.exact import jit, part
 from fringetrace.quadrature import Samples
 from fringetrace.raster import (
-    A, B, C, CELL, HIGH, LEFT, LOW, NUDGE_S, NUDGE_T, RIGHT, S0, S1, SIGN, T0, T1,
-    gradient, patch, plain, scalar, widen,
+    CELL,
+    HIGH,
+    LEFT,
+    LOW,
+    NUDGE_S,
+    NUDGE_T,
+    RIGHT,
+    S0,
+    S1,
+    SIGN,
+    T0,
+    T1,
+    A,
+    B,
+    C,
+    gradient,
+    patch,
+    plain,
+    scalar,
+    widen,
 )  # fmt: skip
 from fringetrace.waves import ComplexArray, FloatArray
 
@@ -50,7 +68,9 @@ P, Q, X, Y, NORMAL_X, NORMAL_Y, WIDTH, REACH, SCALE, SLOPE_X, SLOPE_Y = range(11
 # Columns of two branches at a sample: the sample, z, W, A, B, turns; foot on the fold; the two roots, and
 # how near to them a root is one of them; the row before at this sample; whether the row stands for both
 # branches, or how much of what it says beyond rays is added to them.
-SAMPLE, Z, WAY, RE_A, IM_A, RE_B, IM_B, TURNS, FOOT_P, FOOT_Q, P1, Q1, P2, Q2, NEAR, BEFORE, OWNS, PART = range(18)
+SAMPLE, Z, WAY, RE_A, IM_A, RE_B, IM_B, TURNS, FOOT_P, FOOT_Q, P1, Q1, P2, Q2, NEAR, BEFORE, OWNS, PART = (
+    range(18)
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +82,7 @@ class Folds:
     index : (rows - 1, columns - 1) int64
         Cell on each square of the beam's grid, -1 where there is none.
     place : (cells, 2) int64
-        Row and column of each cell.
+        Row and column of each cell; negative for one that is no square of the grid: no fold is followed there.
     lines : (cells, 3) float64
         The sheet is there where a s + b t >= c.
     seeds : (n, 11) float64
@@ -104,14 +124,16 @@ def folds(
     -------
     Folds
     """
+    squares = np.flatnonzero((place >= 0).all(axis=1))
     index = np.full(place.max(axis=0, initial=-1) + 1, -1, dtype=np.int64)
-    index[tuple(place.T)] = np.arange(len(place))
+    index[tuple(place[squares].T)] = squares
     lines = np.tile([0.0, 0.0, -1.0], (len(place), 1))
     lines[leaves[:, CELL].astype(np.int64)] = leaves[:, A : C + 1]
     # J at the corners of each cell
     corner = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]])
     corners = np.einsum("si,nij,tj->nst", corner, coefficients[:, 3], corner)
-    crossed = np.flatnonzero((corners.min(axis=(1, 2)) <= 0.0) & (corners.max(axis=(1, 2)) >= 0.0))
+    signs = (corners.min(axis=(1, 2)) <= 0.0) & (corners.max(axis=(1, 2)) >= 0.0)
+    crossed = np.flatnonzero(signs & (place >= 0).all(axis=1))
     found = np.empty((0, 11))
     if len(crossed):
         found = seeds(coefficients, index, turns, place, crossed, 2.0 * np.pi / period)
@@ -237,7 +259,7 @@ def window(seed, depth, height, slack, top, rows, columns):
 
 @jit
 def widen_beside(seeds, wavenumber, top, columns, first, x, y, slope):
-    """Widen the gradients in the pixels beside folds, which they may cross anywhere, by the first fringe's."""
+    """Widen the gradients in pixels beside folds, which may cross them anywhere, by the first fringe's."""
     rows = (len(first) - 1) // columns
     for seed in seeds:
         fringe = np.sqrt(FIRST) / (wavenumber * seed[WIDTH])
@@ -273,10 +295,13 @@ def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x
                         continue
                     if height < -DARK or height > 1.1 * LIT:
                         continue
+                    # another seed of the same stretch may have been there
+                    if known(found, latest[k], seed[P], seed[Q], STRETCH):
+                        continue
                     there, p, q = foot(cells, index, seed[P], seed[Q], x[k], y[k])
                     if not there or max(abs(p - seed[P]), abs(q - seed[Q])) > 2.0 * STRETCH:
                         continue
-                    if known(found, latest[k], p, q):
+                    if known(found, latest[k], p, q, SAME):
                         continue
                     if count == len(found):
                         larger = np.empty((2 * count, 18))
@@ -290,10 +315,10 @@ def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x
 
 
 @jit
-def known(found, row, p, q):
-    """Whether one of the rows of a sample has the fold at (p, q)."""
+def known(found, row, p, q, reach):
+    """Whether one of the rows of a sample has its foot on a fold within reach of (p, q)."""
     while row >= 0:
-        if abs(found[row, FOOT_P] - p) + abs(found[row, FOOT_Q] - q) < SAME:
+        if abs(found[row, FOOT_P] - p) + abs(found[row, FOOT_Q] - q) < reach:
             return True
         row = int(found[row, BEFORE])
     return False
@@ -316,9 +341,7 @@ def branches(seed, cells, index, lines, turns, wavenumber, p, q, x, y, row):
     else:
         there, z, way, a, b, passed = False, 0.0, 0.0, 0.0j, 0.0j, 0
         for _ in range(TRIES):
-            there, _, z, way, a, b, passed = continued(
-                cells, index, turns, wavenumber, p, q, width, height
-            )
+            there, _, z, way, a, b, passed = continued(cells, index, turns, wavenumber, p, q, width, height)
             if there:
                 break
             width *= 0.5
@@ -336,7 +359,7 @@ def branches(seed, cells, index, lines, turns, wavenumber, p, q, x, y, row):
 
 @jit
 def resolve(found, latest):
-    """A branch that two folds part from others (near a cusp) is the nearer one's, and corrected for the other."""
+    """A branch between two folds (near a cusp) is the nearer one's, and corrected for the other."""
     for k in range(len(latest)):
         row = latest[k]
         while row >= 0:
@@ -377,7 +400,7 @@ def within(index, lines, p, q):
 
 @part
 def inside(cells, cell, leaf, sign, s, t, x, y):
-    """Where in a leaf the map meets (x, y) on one branch, from (s, t) on: found, s, t and the Jacobian there."""
+    """Where in a leaf a branch of the map meets (x, y), from (s, t) on: found, s, t and the Jacobian."""
     wide, tall = leaf[S1] - leaf[S0], leaf[T1] - leaf[T0]
     leave = 2.0 if leaf[SIGN] == 0.0 else 0.5
     area = 0.0
@@ -392,7 +415,8 @@ def inside(cells, cell, leaf, sign, s, t, x, y):
         stretch = max(abs(ds) / wide, abs(dt) / tall)
         if stretch > 0.75:
             ds, dt = ds * 0.75 / stretch, dt * 0.75 / stretch
-        ds, dt = halved(cells, cell, sign, s, t, ds, dt)
+        if leaf[SIGN] == 0.0:
+            ds, dt = halved(cells, cell, sign, s, t, ds, dt)
         s, t = s + ds, t + dt
         if stretch < 1e-6:
             break
