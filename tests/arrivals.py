@@ -75,3 +75,14 @@ def plane(angle):
         return -(origin @ normal) / (direction @ normal), np.broadcast_to(normal, origin.shape)
 
     return mirror
+
+
+def sphere(radius):
+    """x^2 + y^2 + z^2 = R^2, z > 0, lit straight up from its centre's side."""
+
+    def mirror(origin, direction):
+        x, y, z = origin.T
+        height = np.sqrt(radius**2 - x * x - y * y)
+        return height - z, -np.stack([x, y, height], axis=1) / radius
+
+    return mirror

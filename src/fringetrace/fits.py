@@ -73,6 +73,13 @@ class Fit:
         here = self.pieces
         return Pieces(here.wave, here.cell, here.low, here.high, self.local(here.chord, self.owner)).lines
 
+    @property
+    def place(self) -> npt.NDArray[np.int64]:
+        """(m, 2) row and column of patches that are cells of the grid, all of them lit; else -1."""
+        whole = (self.high - self.low == 1.0).all(axis=1) & (self.low == np.floor(self.low)).all(axis=1)
+        whole[self.owner[~self.pieces.whole]] = False
+        return np.where(whole[:, None], self.low[:, ::-1], -1.0).astype(np.int64)
+
     def where(self, good: npt.NDArray[np.bool_]) -> Fit:
         """Some of the patches."""
         kept = good[self.owner]

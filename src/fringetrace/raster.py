@@ -115,11 +115,9 @@ def split(cells, domain, lines, rows, columns):
 
 
 @part
-def root(cells, cell, s0, s1, t0, t1, fold, sign, s, t, x, y):
-    """Where in a leaf the map meets (x, y), from (s, t) on: found, s, t and the Jacobian there."""
+def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
+    """Where in a regular leaf the map meets (x, y), from (s, t) on: found, s, t and the Jacobian there."""
     wide, tall = s1 - s0, t1 - t0
-    # a regular leaf bends too little to throw a step from inside it out by half its width
-    leave = 2.0 if fold else 0.5
     area = 0.0
     for _ in range(12):
         px, xs, xt = patch(cells, cell, 0, s, t)
@@ -132,52 +130,38 @@ def root(cells, cell, s0, s1, t0, t1, fold, sign, s, t, x, y):
         stretch = max(abs(ds) / wide, abs(dt) / tall)
         if stretch > 0.75:
             ds, dt = ds * 0.75 / stretch, dt * 0.75 / stretch
-        if fold:
-            ds, dt = halved(cells, cell, sign, s, t, ds, dt)
         s, t = s + ds, t + dt
         if stretch < 1e-6:
             break
-        if s < s0 - leave * wide or s > s1 + leave * wide:
-            return False, s, t, area
-        if t < t0 - leave * tall or t > t1 + leave * tall:
+        # a regular leaf bends too little to throw a step from inside it out by half its width
+        if s < s0 - 0.5 * wide or s > s1 + 0.5 * wide or t < t0 - 0.5 * tall or t > t1 + 0.5 * tall:
             return False, s, t, area
     u, v = s + NUDGE_S, t + NUDGE_T
     return (s0 <= u < s1 and t0 <= v < t1), s, t, area
 
 
-@jit
-def halved(cells, cell, sign, s, t, ds, dt):
-    """A step, halved until it does not cross the fold."""
-    for _ in range(6):
-        _, xs, xt = patch(cells, cell, 0, s + ds, t + dt)
-        _, ys, yt = patch(cells, cell, 1, s + ds, t + dt)
-        if (xs * yt - xt * ys) * sign > 0.0:
-            break
-        ds, dt = 0.5 * ds, 0.5 * dt
-    return ds, dt
+@part
+def plain(cells, cell, s, t, area, unit, period):
+    """The wave of one branch: amplitude, spread over |area|, and path."""
+    way = scalar(cells, cell, 2, s, t)
+    amplitude = complex(scalar(cells, cell, 4, s, t), scalar(cells, cell, 5, s, t))
+    turn = 2.0 * np.pi * ((way % period) / period)
+    return np.sqrt(unit / abs(area)) * amplitude * complex(np.cos(turn), np.sin(turn))
 
 
 @part
-def probe(cells, cell, leaf, sign):
-    """Where to start in a leaf: its middle, or in a fold the probe with the largest J of that sign."""
-    best, at_s, at_t = 0.0, 0.5 * (leaf[S0] + leaf[S1]), 0.5 * (leaf[T0] + leaf[T1])
-    if leaf[SIGN] != 0.0:
-        return True, at_s, at_t
-    for i in range(5):
-        for j in range(5):
-            s = leaf[S0] + 0.25 * i * (leaf[S1] - leaf[S0])
-            t = leaf[T0] + 0.25 * j * (leaf[T1] - leaf[T0])
-            _, xs, xt = patch(cells, cell, 0, s, t)
-            _, ys, yt = patch(cells, cell, 1, s, t)
-            area = sign * (xs * yt - xt * ys)
-            if area > best:
-                best, at_s, at_t = area, s, t
-    return best > 0.0, at_s, at_t
+def gradient(cells, cell, s, t):
+    """Gradient of the path on the CCD, along x and y."""
+    _, xs, xt = patch(cells, cell, 0, s, t)
+    _, ys, yt = patch(cells, cell, 1, s, t)
+    _, ws, wt = patch(cells, cell, 2, s, t)
+    area = xs * yt - xt * ys
+    return (ws * yt - wt * ys) / area, (wt * xs - ws * xt) / area
 
 
 @jit
 def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y, field, slope):
-    """Add the waves of leaves to the sample points of a band of pixels that begins at row `top`.
+    """Add the waves of regular leaves to the sample points of a band of pixels that begins at row `top`.
 
     `folded` marks cells in which J changes its sign, `turns` has their caustics passed where J < 0
     and where J > 0, `unit` is the beam area of a cell in pixels. `slope` (lowest and highest of both
@@ -192,37 +176,23 @@ def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y
         begin, end = max(int(np.floor(leaf[LEFT])), 0), min(int(np.floor(leaf[RIGHT])), columns - 1)
         if bottom > above:
             continue
-        s0, s1, t0, t1, fold = leaf[S0], leaf[S1], leaf[T0], leaf[T1], leaf[SIGN] == 0.0
+        s0, s1, t0, t1, sign = leaf[S0], leaf[S1], leaf[T0], leaf[T1], leaf[SIGN]
         bent = folded[cell]
-        for branch in range(2):
-            sign = 2.0 * branch - 1.0
-            if leaf[SIGN] == -sign:
-                continue
-            there, s, t = probe(cells, cell, leaf, sign)
-            if not there:
-                continue
-            phase = np.exp(-0.5j * np.pi * turns[cell, branch])
-            for i in range(bottom, above + 1):
-                for j in range(begin, end + 1):
-                    pixel = (i - top) * columns + j
-                    for k in range(first[pixel], first[pixel + 1]):
-                        found, a, b, area = root(cells, cell, s0, s1, t0, t1, fold, sign, s, t, x[k], y[k])
-                        if not found or leaf[A] * a + leaf[B] * b < leaf[C]:
-                            continue
-                        if not fold:  # the next sample is near
-                            s, t = a, b
-                        way, ws, wt = patch(cells, cell, 2, a, b)
-                        spreading = abs(area) if bent else abs(scalar(cells, cell, 3, a, b))
-                        size = np.sqrt(unit / spreading)
-                        amplitude = (
-                            complex(scalar(cells, cell, 4, a, b), scalar(cells, cell, 5, a, b)) * phase
-                        )
-                        turn = 2.0 * np.pi * ((way % period) / period)
-                        field[k] += size * amplitude * complex(np.cos(turn), np.sin(turn))
-                        if len(slope) > 0:
-                            _, xs, xt = patch(cells, cell, 0, a, b)
-                            _, ys, yt = patch(cells, cell, 1, a, b)
-                            widen(slope[k], (ws * yt - wt * ys) / area, (wt * xs - ws * xt) / area)
+        s, t = 0.5 * (s0 + s1), 0.5 * (t0 + t1)
+        phase = np.exp(-0.5j * np.pi * turns[cell, 1 if sign > 0.0 else 0])
+        for i in range(bottom, above + 1):
+            for j in range(begin, end + 1):
+                pixel = (i - top) * columns + j
+                for k in range(first[pixel], first[pixel + 1]):
+                    found, a, b, area = root(cells, cell, s0, s1, t0, t1, sign, s, t, x[k], y[k])
+                    if not found or leaf[A] * a + leaf[B] * b < leaf[C]:
+                        continue
+                    s, t = a, b  # the next sample is near
+                    spreading = area if bent else scalar(cells, cell, 3, a, b)
+                    field[k] += phase * plain(cells, cell, a, b, spreading, unit, period)
+                    if len(slope) > 0:
+                        across, up = gradient(cells, cell, a, b)
+                        widen(slope[k], across, up)
 
 
 @part

@@ -203,6 +203,7 @@ def _together(parts: list[Fit], base: float, ccd: CCD) -> Cells:
         np.concatenate([part.coefficients for part in parts]),
         np.concatenate([part.turns for part in parts]),
         base,
+        np.concatenate([part.place for part in parts]),
         np.concatenate(owner),
         np.concatenate([part.domain for part in parts]),
         np.concatenate([part.lines for part in parts]),

@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.paths import Fate, Paths
-from fringetrace.quadrature import Samples
 from fringetrace.scene import CCD, Beam
 from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray
@@ -64,13 +63,14 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """A sheet's cells as the kernels read them, see `raster`."""
+    """A sheet's cells as the kernels read them, see `raster`; for `place` see `leaved`."""
 
     coefficients: FloatArray
     leaves: FloatArray
     folded: npt.NDArray[np.bool_]
     turns: npt.NDArray[np.int64]
     base: float
+    place: npt.NDArray[np.int64]
 
 
 def differences(values: FloatArray, axis: int) -> FloatArray:
@@ -390,6 +390,7 @@ def leaved(
     coefficients: FloatArray,
     turns: npt.NDArray[np.int64],
     base: float,
+    place: npt.NDArray[np.int64],
     owner: npt.NDArray[np.int64],
     domain: FloatArray,
     lines: FloatArray,
@@ -402,6 +403,8 @@ def leaved(
     coefficients : (n, 6, 4, 4) float64
     turns : (n, 2) int64
     base : float, metres
+    place : (n, 2) int64
+        Row and column on the beam's grid; -1 for what is no whole cell of it.
     owner : (m,) int64
         Which cells parts of them, that are lit, belong to.
     domain : (m, 4) float64
@@ -424,7 +427,7 @@ def leaved(
         signs[leaves[leaves[:, raster.SIGN] == sign, raster.CELL].astype(np.int64), branch] = True
     folded[leaves[leaves[:, raster.SIGN] == 0.0, raster.CELL].astype(np.int64)] = True
     folded |= signs.all(axis=1)
-    return Cells(np.ascontiguousarray(coefficients), leaves, folded, turns, base)
+    return Cells(np.ascontiguousarray(coefficients), leaves, folded, turns, base, place)
 
 
 def cells(sheet: Sheet, ccd: CCD) -> Cells:
@@ -453,7 +456,8 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
     )  # fmt: skip
     lines = np.tile([0.0, 0.0, -1.0], (len(domain), 1))  # all of each cell
     turns = branch_turns(sheet.turns, area)[whole]
-    return leaved(coefficients[whole], turns, sheet.base, np.arange(len(domain)), domain, lines, ccd)
+    place = np.argwhere(whole)
+    return leaved(coefficients[whole], turns, sheet.base, place, np.arange(len(domain)), domain, lines, ccd)
 
 
 def largest(grid: Array, size: int) -> Array:
@@ -475,31 +479,3 @@ def branch_turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[
         corner, near = largest(known, 2), largest(np.pad(known, 1, constant_values=none), 4)
         branches.append(np.where(corner > none, corner, np.where(near > none, near, 0)))
     return np.stack(branches, axis=-1)
-
-
-def spread(
-    cells: Cells, unit: float, period: float, points: Samples, field: ComplexArray, slope: FloatArray
-) -> None:
-    """Add a sheet's waves to sample points.
-
-    Parameters
-    ----------
-    cells : Cells
-    unit : float
-        The beam's area that a step of its grid stands for, in pixels.
-    period : float, metres
-        The wavelength.
-    points : Samples
-    field : (points,) complex128
-        Added to.
-    slope : (points, 4) float64, metres a pixel, or (0, 4)
-        Widened, see `raster.spread`.
-    """
-    from fringetrace import raster
-
-    own = points.blank(1)[0]
-    raster.spread(
-        cells.leaves, cells.coefficients, cells.folded, cells.turns, unit, period, points.top,
-        points.columns, points.first, points.x, points.y, own, slope,
-    )  # fmt: skip
-    field += own * np.exp(2j * np.pi * np.fmod(cells.base, period) / period)

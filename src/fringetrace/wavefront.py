@@ -41,24 +41,6 @@ class Light:
     curved: list[tuple[int, Cells]]
     segments: FloatArray
 
-    def add(self, period: float, points: Samples, field: ComplexArray, slope: FloatArray) -> None:
-        """Add to fields at sample points.
-
-        Parameters
-        ----------
-        period : float, metres
-            The wavelength.
-        points : Samples
-        field : (groups, points) complex128
-            Added to.
-        slope : (points, 4) float64, metres a pixel, or (0, 4)
-            Widened, see `quadrature.fringes`.
-        """
-        for group, wave, region in self.plane:
-            regions.spread(wave, region, self.beam, period, points, field[group], slope)
-        for group, cells in self.curved:
-            sheets.spread(cells, self.unit, period, points, field[group], slope)
-
 
 def light(paths: Paths, groups: Numbers, half_wave_loss: bool = True) -> Light:
     """Plane waves and curved sheets of a beam.
@@ -129,11 +111,27 @@ def fields(
     mutual : (groups, groups, rows, columns) complex128
         See `quadrature.averaged`.
     """
+    from fringetrace import folds
+
+    curved = [
+        (
+            group,
+            folds.folds(
+                part.coefficients, part.leaves, part.folded, part.turns, part.place, period, beam.unit
+            ),
+            np.exp(2j * np.pi * np.fmod(part.base, period) / period),
+        )
+        for beam in lights
+        for group, part in beam.curved
+    ]
 
     def at(points: Samples, slope: FloatArray) -> ComplexArray:
         field = points.blank(groups)
         for beam in lights:
-            beam.add(period, points, field, slope)
+            for group, wave, region in beam.plane:
+                regions.spread(wave, region, beam.beam, period, points, field[group], slope)
+        for group, sheet, phase in curved:
+            field[group] += folds.light(sheet, points, slope) * phase
         return field
 
     segments = np.concatenate([beam.segments for beam in lights])
