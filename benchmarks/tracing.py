@@ -1,6 +1,8 @@
 """Run time beside raw embreex: ratios of medians, measured in one run.
 
-    python benchmarks/tracing.py [--rays 1e6] [--json FILE]
+    python benchmarks/tracing.py [--rays 1e6] [--json FILE] [--write]
+
+`--write` puts the figures between the marks in README.md and docs/engine.md, all from this run.
 
 Raw embreex is `EmbreeScene.run` on the float32 rays that the trace recorded, pass by pass, on all
 triangles in one scene: no path, no point, no reflection, triangle numbers only. Ours gives, for the
@@ -28,6 +30,7 @@ from embreex.rtcore_scene import EmbreeScene
 import fringetrace as ft
 
 ROUNDS = 3
+ROOT = Path(__file__).resolve().parents[1]
 
 
 def seconds(work) -> float:
@@ -73,6 +76,8 @@ def compare(name: str, scene: ft.Scene, paths: ft.Paths, ours: dict) -> dict:
     return {
         "scene": name,
         "segments": count,
+        "rays": paths.source.shape[0] * paths.source.shape[1],
+        "decided exactly, part": paths.doubtful / paths.segments,
         "raw ns/segment": base / count * 1e9,
         **{f"{label}: ratio to raw": base / median[label] for label in ours},
         **{f"{label}: seconds": median[label] for label in ours},
@@ -179,6 +184,75 @@ def memory(rays: float) -> dict:
     }
 
 
+def counted(number: float) -> str:
+    """A number of rays in words of the table."""
+    return f"{number / 1e6:.3g}M" if number >= 1e6 else f"{number / 1e3:.3g}k"
+
+
+def share(part: float) -> str:
+    """A part as a percentage of two digits."""
+    return f"{100 * part:.2g}"
+
+
+def table(results: dict) -> str:
+    """The figures of a whole run as rows of Markdown."""
+    traced = [results[name] for name in ("rods", "corner_cube", "michelson")]
+    rods, cube, michelson = (
+        f"{one['1 thread: ratio to raw']:.2f} / {one['2 threads: ratio to raw']:.2f}" for one in traced
+    )
+    count, memory = counted(traced[0]["rays"]), results["memory"]
+    rows = [
+        (f"`benchmarks/tracing.py`, {os.cpu_count()} cores", ""),
+        ("---", "---"),
+        (
+            f"first 12 bounces in a box of 80 rods, {count} rays, path, optical path and position out: speed "
+            "beside raw embreex on the same rays, 1 / 2 threads",
+            rods,
+        ),
+        ("the same in a corner cube of 1e7 wavelengths with two wedged plates, 22k triangles", cube),
+        (
+            f"Michelson, both arms, {count} rays onto as many pixels, ray sum: beside raw embreex on all its "
+            "segments",
+            michelson,
+        ),
+        (
+            "hits that float64 decides alone, in these three",
+            ", ".join(f"{share(one['decided exactly, part'])} %" for one in traced),
+        ),
+        ("`import fringetrace` beside `import numpy, embreex`", f"{results['start']['import ratio']:.2f}"),
+        ("a second `fringetrace demo`", f"{results['start']['second demo, s']:.1f} s"),
+        (f"peak memory for {counted(memory['rays'])} rays into a field", f"{memory['peak, MiB']:.0f} MiB"),
+    ]
+    return "\n".join(f"| {' | '.join(row)} |".replace("  |", " |") for row in rows)
+
+
+def doubts(results: dict) -> str:
+    """The range of what is decided exactly, for a sentence."""
+    parts = [results[name]["decided exactly, part"] for name in ("rods", "corner_cube", "michelson")]
+    return f"{share(min(parts))} to {share(max(parts))} %"
+
+
+def between(text: str, name: str, words: str) -> str:
+    """A text with `words` between its marks called `name`."""
+    begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+    if text.count(begin) != 1 or text.count(end) != 1:
+        raise SystemExit(f"expected the marks {begin} and {end} once each")
+    head, _, rest = text.partition(begin)
+    return head + begin + words + end + rest.partition(end)[2]
+
+
+def write(results: dict, root: Path) -> None:
+    """Put the figures of a whole run into the README and the docs."""
+    for place, name, words in (
+        ("README.md", "tracing", f"\n{table(results)}\n"),
+        ("docs/engine.md", "doubts", doubts(results)),
+    ):
+        path = root / place
+        beside = path.with_name(path.name + ".new")
+        beside.write_text(between(path.read_text(), name, words))
+        beside.replace(path)
+
+
 def main() -> None:
     """Run all, print all."""
     parser = argparse.ArgumentParser(
@@ -188,7 +262,11 @@ def main() -> None:
     parser.add_argument("--stream", type=float, default=1e7, help="rays of the memory test")
     parser.add_argument("--json", type=Path, help="file to write the figures to")
     parser.add_argument("--only", choices=["rods", "corner_cube", "michelson", "start", "memory"])
+    parser.add_argument("--write", action="store_true", help="put the figures into README.md and docs")
+    parser.add_argument("--root", type=Path, default=ROOT, help="folder of the README that is written to")
     chosen = parser.parse_args()
+    if chosen.write and chosen.only:
+        parser.error("--write: expected a run of all parts, got --only")
     side = round(np.sqrt(chosen.rays))
     parts = {
         "rods": lambda: bouncing(scenes.rods, side),
@@ -204,6 +282,8 @@ def main() -> None:
             print(f"\n{name}")
             for label, value in results[name].items():
                 print(f"  {label:45s} {value if isinstance(value, (str, int)) else format(value, '.3f')}")
+    if chosen.write:
+        write(results, chosen.root)
     if chosen.json:
         chosen.json.write_text(json.dumps(results, indent=1) + "\n")
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from columns import BARE
 
 import fringetrace as ft
 from fringetrace import Fate, shapes
@@ -38,18 +39,7 @@ def test_where_takes_masks_and_indices(split):
     rows = np.flatnonzero(mask)
     for some in (split.where(mask), split.where(rows)):
         assert len(some) == mask.sum() > 0
-        for name in (
-            "ray",
-            "fate",
-            "length",
-            "origin",
-            "direction",
-            "amplitude",
-            "lost",
-            "key",
-            "pixel",
-            "points",
-        ):
+        for name in (*BARE, "pixel", "points"):
             assert np.array_equal(getattr(some, name), getattr(split, name)[rows], equal_nan=True)
         assert np.array_equal(some.surface, split.surface[rows])
         assert np.array_equal(some.polyline(0), split.polyline(rows[0]))
@@ -250,3 +240,23 @@ def test_projected_pixels_are_half_open(grid):
     inside = ((place >= 0) & (place < grid)).all(axis=1)
     assert np.array_equal(seen.fate == Fate.DETECTED, inside)
     assert np.array_equal(seen.pixel[inside], place[inside])
+
+
+@pytest.mark.parametrize("surface", [-1, 3])
+def test_visits_are_to_surfaces_of_the_scene(split, surface):
+    with pytest.raises(ValueError, match=rf"visits surface: expected a number from 0 to \d, got {surface}"):
+        split.visits(surface)
+
+
+@pytest.mark.parametrize("what", ["sequence", "polyline"])
+def test_rows_are_those_of_the_table(split, what):
+    read = getattr(split, what)
+    assert np.array_equal(read(-1), read(len(split) - 1))
+    for row in (len(split), -len(split) - 1):
+        with pytest.raises(IndexError, match=f"{what} row: expected one of {len(split)} paths, got {row}"):
+            read(row)
+
+
+def test_nothing_cannot_be_joined():
+    with pytest.raises(ValueError, match="join: expected at least one Paths, got none"):
+        join([])

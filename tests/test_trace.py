@@ -5,6 +5,7 @@ import threading
 
 import numpy as np
 import pytest
+from columns import BARE
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -354,18 +355,7 @@ def test_sequences_read_off_the_keys_are_those_recorded(recorded):
 
 def test_a_record_changes_nothing_else(recorded):
     bare = ft.trace(recorded.scene, recorded.source, recorded.ccd, max_bounces=8)
-    for name in (
-        "ray",
-        "fate",
-        "bounces",
-        "reflections",
-        "length",
-        "origin",
-        "direction",
-        "amplitude",
-        "lost",
-        "key",
-    ):
+    for name in BARE:
         assert np.array_equal(getattr(bare, name), getattr(recorded, name)), name
     assert bare.surface is bare.triangle is bare.points is None
 
@@ -577,3 +567,20 @@ def test_numpy_numbers_are_numbers():
         min_amplitude=np.float32(0),
     )
     assert paths.bounces.tolist() == [1]
+
+
+def test_no_kind_of_integer_compiles_the_loops_again():
+    from fringetrace import bounces
+
+    scene, rays = ft.Scene([surface(), surface(z=1.0)]), one()
+    box = ft.Scene([ft.Surface(shapes.plate(1.0, 1.0, 1.0), ft.Mirror())])
+    inside = one((0.1, 0.1, -0.5), (0.3, 0.2, 0.1))
+
+    def compiled(most):
+        for where, what in ((scene, rays), (box, inside)):
+            assert ft.trace(where, what, max_bounces=most).bounces.tolist() == [3]
+        return len(bounces.interact.signatures), len(bounces.rebound.signatures)
+
+    before = compiled(3)
+    for kind in (np.int32, np.uint8, np.int64):
+        assert compiled(kind(3)) == before

@@ -212,7 +212,9 @@ def close_up(batch, start, born, to):
     lost, amplitude, key, ray, bounces, reflections, serial, state, last, came = batch
     for i in range(born):  # to <= start: in order, nothing is overwritten before it is read
         old, new = start + i, to + i
-        state[new], came[new] = state[old], came[old]
+        for k in range(state.shape[1]):
+            state[new, k] = state[old, k]
+        came[new, 0], came[new, 1], came[new, 2] = came[old, 0], came[old, 1], came[old, 2]
         label(key, ray, bounces, new, key[old], ray[old], bounces[old])
         weigh(lost, amplitude, reflections, new, lost[old], amplitude[old], reflections[old])
         last[new], serial[new] = last[old], serial[old]

@@ -202,9 +202,9 @@ def crossing(planes, tri, x, y, z, dx, dy, dz):
 def unsure(guess, again, path, facing, own, leaving, closed):
     """Whether float32 does not decide, edges left aside; `again`: it names the triangle just left."""
     if guess < 0:
-        return guess == -2 or (own and closed and leaving < 0.0)
-    measurable = path > MARGIN and path < 1e300
-    return not measurable or (own and (again or (closed and facing * leaving >= 0.0)))
+        return (guess == -2) | (own & closed & (leaving < 0.0))
+    measurable = (path > MARGIN) & (path < 1e300)
+    return (not measurable) | (own & (again | (closed & (facing * leaving >= 0.0))))
 
 
 @jit

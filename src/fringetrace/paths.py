@@ -161,9 +161,12 @@ class Paths:
 
         Raises
         ------
+        IndexError
+            If there is no such path.
         ValueError
             If the path has too many bounces for a 64-bit key to tell.
         """
+        row = self._row(row, "sequence")
         digits = self._digits(self.key[row : row + 1], self.bounces[row : row + 1])[0]
         return [((int(d) - 1) // 2, d % 2 == 0) for d in digits]
 
@@ -181,8 +184,11 @@ class Paths:
         Raises
         ------
         ValueError
-            If a path has too many bounces for its key to tell.
+            If there is no such surface, or a path has too many bounces for its key to tell.
         """
+        count = len(self.scene.surfaces)
+        if not 0 <= surface < count:
+            raise ValueError(f"visits surface: expected a number from 0 to {count - 1}, got {surface}")
         # digits are never 0: equal keys mean equal numbers of bounces
         kinds = np.unique(self.key)
         which = np.searchsorted(kinds, self.key)
@@ -190,6 +196,12 @@ class Paths:
         bounces[which] = self.bounces
         digits = self._digits(kinds, bounces)
         return np.asarray(((digits - 1) // 2 == surface).sum(axis=1)[which], dtype=np.int64)
+
+    def _row(self, row: int, what: str) -> int:
+        """A row counted from the start; a negative one is counted from the end."""
+        if not -len(self) <= row < len(self):
+            raise IndexError(f"{what} row: expected one of {len(self)} paths, got {row}")
+        return row % len(self)
 
     def _digits(self, keys: Array, bounces: Array) -> Array:
         """Digits of keys, one for each bounce, padded with -1."""
@@ -222,12 +234,14 @@ class Paths:
 
         Raises
         ------
+        IndexError
+            If there is no such path.
         ValueError
             If the trace did not record them.
         """
         if self.points is None:
             raise ValueError("polyline: expected paths traced with record=True, got paths without points")
-        points = self.points[row]
+        points = self.points[self._row(row, "polyline")]
         return np.asarray(points[np.isfinite(points[:, 0])], dtype=np.float64)
 
     def ledger(self) -> Ledger:
@@ -357,7 +371,14 @@ def join(parts: Sequence[Paths]) -> Paths:
     Returns
     -------
     Paths
+
+    Raises
+    ------
+    ValueError
+        If there are none.
     """
+    if not parts:
+        raise ValueError("join: expected at least one Paths, got none")
     if len(parts) == 1:
         return parts[0]
     columns: dict[str, Any] = {}
