@@ -62,7 +62,7 @@ METHODS = (
     Method("float32, facets", single.trace, "rays", False, (64, 128, 256, 512, 1024), (24, 48, 96)),
     Method("rays, facets", trace, "rays", False, (64, 128, 256, 512, 1024), (24, 48, 96)),
     Method("rays, form", trace, "rays", True, (64, 128, 256, 512), (24, 48, 96)),
-    Method("wavefront, facets", trace, "wavefront", False, (8, 16, 32), (4, 8)),
+    Method("wavefront, facets", trace, "wavefront", False, (4, 8, 16), (4,)),
     Method("wavefront, form", trace, "wavefront", True, (6, 12, 24, 48, 96), (6, 12, 24)),
 )
 
@@ -145,6 +145,7 @@ def run(standard: Standard, truth: Truth, method: Method, count: int, repeats: i
     Parameters
     ----------
     standard : Standard
+        Without its forms where the method is one of facets; see `Standard.faceted`.
     truth : mean field and irradiance, each (rows, columns)
     method : Method
     count : int
@@ -157,11 +158,10 @@ def run(standard: Standard, truth: Truth, method: Method, count: int, repeats: i
     Run
         Its standard is named by its title.
     """
-    used = standard if method.form else standard.faceted()
 
     def once() -> tuple[float, Paths, ComplexArray]:
         begin = time.perf_counter()
-        paths = method.tracer(used.scene, used.lit(count), used.ccd)
+        paths = method.tracer(standard.scene, standard.lit(count), standard.ccd)
         field = complex_field(paths, WAVELENGTH, method.sum)
         return time.perf_counter() - begin, paths, field
 
@@ -170,7 +170,7 @@ def run(standard: Standard, truth: Truth, method: Method, count: int, repeats: i
         seconds = min(seconds, once()[0])
     bright = irradiance(paths, WAVELENGTH) if method.sum == "wavefront" else np.abs(field) ** 2
     return Run(
-        standard.title, method.name, count**2, used.triangles, seconds,
+        standard.title, method.name, count**2, standard.triangles, seconds,
         phase_error(field, truth[0]), irradiance_error(bright, truth[1]),
     )  # fmt: skip
 
@@ -188,7 +188,7 @@ def runs(
     Parameters
     ----------
     names : iterable of str
-        Of `STANDARDS`.
+        Of `STANDARDS`, at least one.
     quick : bool
         Fewer pixels and rays.
     progress : callable, optional
@@ -204,22 +204,31 @@ def runs(
         For the name of a standard that there is not.
     """
     size = QUICK if quick else FULL
-    plan = []
-    for name in checked(names):
-        standard = STANDARDS[name](size.pixels, size.cells)
-        counts = [(method, method.quick if quick else method.full) for method in METHODS]
-        plan += [(name, standard, m, n) for m, some in counts if m.suits(standard) for n in some]
-    truths: dict[str, Truth] = {}
-    for done, (name, standard, method, count) in enumerate(plan):
-        if name not in truths:
-            truths = {name: standard.truth()}
-        if method.sum == "wavefront" and standard.curved and not method.form:
-            standard = STANDARDS[name](size.pixels, count // 2)
-        if count == (method.quick if quick else method.full)[0]:  # compiles, builds trees
-            run(standard, truths[name], method, count)
-        yield run(standard, truths[name], method, count, size.repeats)
-        if progress is not None:
-            progress(done + 1, len(plan))
+    chosen = [(name, STANDARDS[name](size.pixels, size.cells)) for name in checked(names)]
+    plan = [
+        (name, standard, method, method.quick if quick else method.full)
+        for name, standard in chosen
+        for method in METHODS
+        if method.suits(standard)
+    ]
+    total, done = sum(len(counts) for *_, counts in plan), 0
+    truth, begun = chosen[0][1].truth(), set()
+    for row, (name, standard, method, counts) in enumerate(plan):
+        if row and standard is not plan[row - 1][1]:
+            truth = standard.truth()
+        follow = method.sum == "wavefront" and standard.curved and not method.form
+        used = standard if method.form else standard.faceted()
+        for count in counts:
+            if follow:
+                used = STANDARDS[name](size.pixels, count // 2).faceted()
+            elif method.name not in begun:  # compiles
+                run(used, truth, method, count)
+                begun.add(method.name)
+            method.tracer(used.scene, used.lit(1), used.ccd)  # builds what belongs to the scene
+            yield run(used, truth, method, count, size.repeats)
+            done += 1
+            if progress is not None:
+                progress(done, total)
 
 
 def checked(names: Iterable[str]) -> tuple[str, ...]:
