@@ -119,11 +119,11 @@ def converging(x: FloatArray, y: FloatArray, focal: float, z: float, start: floa
     -------
     complex128
     """
-    rho, depth = np.hypot(x, y), focal - z
-    angle = np.arctan2(rho, depth)
-    grow = focal / np.cos(angle / 2.0) ** 2 * depth / (rho**2 + depth**2)
-    irradiance = 2.0 * focal * np.tan(angle / 2.0) / rho * grow
-    path = start + focal - np.hypot(rho, depth)
+    depth = focal - z
+    reach = np.sqrt(x * x + y * y + depth**2)
+    # r dr / (rho d rho), with tan(t/2) = rho / (depth + reach)
+    irradiance = 4.0 * focal**2 * depth / (reach * (reach + depth) ** 2)
+    path = start + focal - reach
     return np.asarray(-np.sqrt(irradiance) * _turned(path))
 
 
@@ -145,13 +145,15 @@ def diverging(x: FloatArray, y: FloatArray, radius: float, z: float, start: floa
     -------
     complex128
     """
-    rho = np.hypot(x, y)
-    r = rho / (1.0 + 2.0 * z / radius)
+    rho = np.asarray(np.hypot(x, y))
+    near = 1.0 / (1.0 + 2.0 * z / radius)
+    r = near * rho
     for _ in range(STEPS):
         there, grow, _ = _off_sphere(r, radius, z)
         r = r - (there - rho) / grow
     _, grow, path = _off_sphere(r, radius, z)
-    return np.asarray(-np.sqrt(r / (rho * grow)) * _turned(start + path))
+    ratio = np.divide(r, rho, out=np.full(rho.shape, near), where=rho > 0.0)
+    return np.asarray(-np.sqrt(ratio / grow) * _turned(start + path))
 
 
 def _off_sphere(r: FloatArray, radius: float, z: float) -> tuple[FloatArray, FloatArray, FloatArray]:
