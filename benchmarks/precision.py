@@ -17,13 +17,19 @@ PICTURE = "images/work_precision.png"
 SECTION = """## Run time against error
 
 What a method needs for how small an error, on scenes whose field on every pixel is known in closed
-form: made by `benchmarks/precision.py --write`, on your machine by `fringetrace bench`. Phase error:
-of the mean field of each pixel, absolute, in waves of 632.8 nm, rms over the pixels, each weighted with
-its irradiance. Irradiance error: rms over the pixels, relative to the mean; the ray sum knows only the
-square of the mean field, which is less where phases differ within a pixel. Seconds: trace and field,
-{cores} cores. "float32" adds up paths in single precision, as Embree gives them, and sums rays; "facets" are
-the mesh as it is, "form" the surface that it stands for; the wavefront method's meshes grow with its rays
-where facets stand for a curved surface. The most exact run of each:
+form: made by `benchmarks/precision.py --write`, on your machine by `fringetrace bench`.
+
+- Phase error: of the mean field of each pixel, absolute, in waves of 632.8 nm, rms over the pixels, each
+  weighted with its irradiance.
+- Irradiance error: rms over the pixels, relative to the mean. The ray sum squares the mean field, which is
+  less where phases differ within a pixel; and it adds fields by beam area, so that light concentrated g
+  times comes out as g squared (the paraboloid 2.8, the sphere 0.5).
+- Seconds: trace and field, on {cores} cores.
+- "float32" adds up paths in single precision, with Embree's distances, and sums rays.
+- "facets" are the mesh as it is, "form" is the surface that it stands for. The wavefront method's meshes
+  grow with its rays where facets stand for a curved surface: each facet is a plane mirror to it.
+
+The most exact run of each:
 
 {table}
 

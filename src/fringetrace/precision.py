@@ -59,11 +59,11 @@ class Method:
 
 
 METHODS = (
-    Method("float32, facets", single.trace, "rays", False, (64, 128, 256, 512, 1024), (24, 48, 96)),
-    Method("rays, facets", trace, "rays", False, (64, 128, 256, 512, 1024), (24, 48, 96)),
-    Method("rays, form", trace, "rays", True, (64, 128, 256, 512), (24, 48, 96)),
+    Method("float32, facets", single.trace, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)),
+    Method("rays, facets", trace, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)),
+    Method("rays, form", trace, "rays", True, (64, 128, 256, 400), (24, 48, 96)),
     Method("wavefront, facets", trace, "wavefront", False, (4, 8, 16), (4,)),
-    Method("wavefront, form", trace, "wavefront", True, (6, 12, 24, 48, 96), (6, 12, 24)),
+    Method("wavefront, form", trace, "wavefront", True, (4, 6, 9, 14, 24, 48), (4, 8, 16)),
 )
 
 

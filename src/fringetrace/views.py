@@ -35,6 +35,9 @@ STYLES = (
     ("#0072B2", "D", "-"), ("#009E73", "v", "-"), ("#CC79A7", "P", "-"),
 )  # fmt: skip
 
+# Room around curves on logarithmic axes, a factor.
+MARGIN = 2.0
+
 # By panel and curve: rays, seconds, error.
 Panels = dict[str, dict[str, FloatArray]]
 
@@ -230,7 +233,7 @@ def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str |
 
 
 def work_precision(panels: Panels) -> Figure:
-    """Error against seconds and against rays, a pair of axes for each panel, all logarithmic.
+    """Error against seconds and against rays, a pair of axes for each panel, logarithmic, to one scale.
 
     Parameters
     ----------
@@ -252,6 +255,8 @@ def work_precision(panels: Panels) -> Figure:
         raise ValueError("work_precision: expected at least one panel, got none")
     labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
     rows = (len(panels) + 1) // 2
+    every = np.concatenate([curve for curves in panels.values() for curve in curves.values()], axis=1)
+    shown = every.min(axis=1) / MARGIN, every.max(axis=1) * MARGIN
     figure = Figure(figsize=(12.0, 1.0 + 2.6 * rows), layout="constrained")
     parts = figure.subfigures(rows, 2, squeeze=False).ravel()
     handles = {}
@@ -265,10 +270,10 @@ def work_precision(panels: Panels) -> Figure:
                 (handles[label],) = ax.loglog(work, error, **style)
         pair[0].set(xlabel="seconds", ylabel="phase error / waves")
         pair[1].set(xlabel="rays")
-        for ax in pair:
+        for ax, column in zip(pair, (1, 0), strict=True):
+            ax.set(xlim=[end[column] for end in shown], ylim=[end[2] for end in shown])
             ax.grid(alpha=0.3)
-    shown = [handles[label] for label in labels]
-    figure.legend(shown, labels, loc="outside lower center", ncols=len(labels))
+    figure.legend([handles[label] for label in labels], labels, loc="outside lower center", ncols=len(labels))
     return figure
 
 
