@@ -1,7 +1,7 @@
 """Stress tests of numerical stability: the worst figure of each, against mpmath or a closed form.
 
 python benchmarks/stability.py           print the table
-python benchmarks/stability.py --write   and write docs/accuracy.md
+python benchmarks/stability.py --write   and write its section of docs/accuracy.md
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -362,9 +361,7 @@ def table() -> str:
     return "\n".join(lines)
 
 
-INTRODUCTION = """# Accuracy
-
-## Numerical stability
+INTRODUCTION = """## Numerical stability
 
 The worst figure of each stress test, made by `benchmarks/stability.py --write`;
 `tests/physics/test_stability.py` keeps them. Errors are of the optical path, in waves of 500 nm (of
@@ -375,13 +372,12 @@ that missed, leaked, hit what they had just left, or went into a wrong pixel.
 
 
 def main() -> None:
-    """Print the table; write the page if asked to."""
-    text = INTRODUCTION + table() + "\n"
+    """Print the table; write the section if asked to."""
+    text = INTRODUCTION + table()
     if "--write" in sys.argv[1:]:
-        place = Path(__file__).parents[1] / "docs" / "accuracy.md"
-        beside = place.with_suffix(".part")
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(place)
+        import pages
+
+        pages.write("stability", text)
 
 
 if __name__ == "__main__":

@@ -304,6 +304,37 @@ def test_an_interrupt_ends_it_quietly(command, sample, tmp_path, monkeypatch):
     assert not out.exists()
 
 
+def test_a_bench_says_what_methods_need_and_writes_it_down(command, tmp_path):
+    out = tmp_path / "out"
+    code, said, errors = command("bench", "--quick", "--scenes", "valley", "--out", out)
+    assert (code, errors) == (0, "")
+    assert {file.name for file in out.iterdir()} == {"work_precision.json", "work_precision.png"}
+    table = [line for line in said.splitlines() if line.startswith("| valley of two mirrors")]
+    assert [row.split("|")[2].strip() for row in table] == [
+        "float32, facets", "rays, facets", "wavefront, facets",
+    ]  # fmt: skip
+    assert "work_precision.png" in said
+
+
+def test_a_bench_of_unknown_scenes_is_refused(command, tmp_path):
+    code, said, errors = command("bench", "--scenes", "step", "lens", "--out", tmp_path / "out")
+    assert (code, said) == (2, "")
+    assert "scenes: expected some of paraboloid" in errors
+    assert "got 'lens'" in errors
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bench_that_fails_leaves_nothing(command, tmp_path, monkeypatch):
+    def full(*args):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("fringetrace.precision.write", full)
+    code, _, errors = command("bench", "--quick", "--scenes", "tilt", "--out", tmp_path / "out")
+    assert code == 2
+    assert "No space left on device" in errors
+    assert not (tmp_path / "out").exists()
+
+
 def test_it_runs_as_a_command_of_its_own(sample, tmp_path):
     done = process("interferogram", sample, "--unit", "mm", "--out", "out", *QUICK, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")

@@ -6,7 +6,7 @@ a 0.3 m instrument keeps all the digits of float32. Nothing else knows Embree.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from fringetrace.mesh import Mesh
 from fringetrace.triangles import weld
-from fringetrace.waves import FloatArray
+from fringetrace.waves import Array, FloatArray
 
 IntArray = npt.NDArray[np.int64]
+Float32 = npt.NDArray[np.float32]
 EPSILON = float(np.finfo(np.float64).eps)
 # A body may be this many times larger than the smallest surface in it: float32 has bits to spare.
 SPREAD = 64.0
@@ -312,3 +313,30 @@ def group(meshes: Sequence[Mesh], alone: frozenset[int] = frozenset()) -> list[t
         else:
             home.append(i)
     return [tuple(some) for some in groups]
+
+
+def plain(vertices: Float32, faces: IntArray) -> Callable[[Float32, Float32], tuple[Array, Float32, Float32]]:
+    """Embree alone, all of it in float32: what others trace with, to compare with.
+
+    Parameters
+    ----------
+    vertices : (v, 3) float32
+    faces : (f, 3) int64
+
+    Returns
+    -------
+    callable
+        From origins and directions (n, 3) float32 to the triangles met (n,) int32, -1 for none,
+        the paths to them (n,) float32, and their normals (n, 3) float32, not of unit length.
+    """
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    scene = EmbreeScene(robust=True)
+    TriangleMesh(scene, vertices, faces.astype(np.int32))
+
+    def hits(origin: Float32, direction: Float32) -> tuple[Array, Float32, Float32]:
+        answer = scene.run(origin, direction, output=1)
+        return answer["primID"], answer["tfar"], answer["Ng"]
+
+    return hits

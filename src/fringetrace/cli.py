@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
@@ -139,6 +139,42 @@ def demo(
         f"{1e6 * RELIEF:g} um"
     )
     _run(height_map(z[::2, ::2], 2.0 * pitch, name="elevation map"), name, out, None, settings)
+
+
+@app.command
+def bench(
+    *,
+    out: Path = Path("fringetrace-bench"),
+    quick: bool = False,
+    scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+) -> None:
+    """Run time against error on this machine: methods on scenes whose field is known in closed form.
+
+    The ray sum and the wavefront method, with facets and with the exact surface behind them, and a
+    tracer in float32 throughout, each with more and more rays: two minutes, or twenty seconds if
+    quick. Written to the folder OUT: work_precision.png, work_precision.json.
+
+    Parameters
+    ----------
+    out
+        Folder to write to.
+    quick
+        Fewer pixels and rays.
+    scenes
+        Some of paraboloid, sphere, newton, tilt, step, valley, corner_cube. Default: all.
+    """
+    from rich.console import Console
+
+    from fringetrace import measurement, precision
+    from fringetrace.standards import STANDARDS
+
+    names = precision.checked(scenes or STANDARDS)
+    with measurement.staged(out) as folder, _progress("running") as advance:
+        done = list(precision.runs(names, quick, advance))
+        precision.write(done, folder)
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(precision.table(done), markup=False)
+    _say(console, "written", f"{out}: {', '.join(precision.FILES)}")
 
 
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:

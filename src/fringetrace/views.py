@@ -16,9 +16,30 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["height", "interferogram", "opengl", "phase", "picture", "residual", "save", "show"]
+__all__ = [
+    "height",
+    "interferogram",
+    "opengl",
+    "phase",
+    "picture",
+    "residual",
+    "save",
+    "show",
+    "work_precision",
+]
 
 NO_LIGHT = "#D0D0D0"
+# Colours that colour-blind people tell apart (Okabe and Ito), with a mark and a line for each.
+STYLES = (
+    ("#999999", "x", ":"), ("#E69F00", "o", "--"), ("#56B4E9", "s", "--"), ("#D55E00", "^", "-"),
+    ("#0072B2", "D", "-"), ("#009E73", "v", "-"), ("#CC79A7", "P", "-"),
+)  # fmt: skip
+
+# Room around curves on logarithmic axes, a factor.
+MARGIN = 2.0
+
+# By panel and curve: rays, seconds, error.
+Panels = dict[str, dict[str, FloatArray]]
 
 
 def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
@@ -209,6 +230,51 @@ def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str |
     if bar is not None:
         bar.set_ticks([-np.pi, 0.0, np.pi], labels=["−π", "0", "π"])
     return ax
+
+
+def work_precision(panels: Panels) -> Figure:
+    """Error against seconds and against rays, a pair of axes for each panel, logarithmic, to one scale.
+
+    Parameters
+    ----------
+    panels : dict of dict of (3, n) float64
+        By panel and curve: rays, seconds, phase error in waves.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    ValueError
+        If there is nothing to draw.
+    """
+    from matplotlib.figure import Figure
+
+    if not panels:
+        raise ValueError("work_precision: expected at least one panel, got none")
+    labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
+    rows = (len(panels) + 1) // 2
+    every = np.concatenate([curve for curves in panels.values() for curve in curves.values()], axis=1)
+    shown = every.min(axis=1) / MARGIN, every.max(axis=1) * MARGIN
+    figure = Figure(figsize=(12.0, 1.0 + 2.6 * rows), layout="constrained")
+    parts = figure.subfigures(rows, 2, squeeze=False).ravel()
+    handles = {}
+    for part, (title, curves) in zip(parts, panels.items(), strict=False):
+        part.suptitle(title, fontsize="medium")
+        pair = part.subplots(1, 2, sharey=True)
+        for label, (rays, seconds, error) in curves.items():
+            colour, mark, line = STYLES[labels.index(label) % len(STYLES)]
+            style = {"color": colour, "marker": mark, "linestyle": line, "markersize": 5}
+            for ax, work in zip(pair, (seconds, rays), strict=True):
+                (handles[label],) = ax.loglog(work, error, **style)
+        pair[0].set(xlabel="seconds", ylabel="phase error / waves")
+        pair[1].set(xlabel="rays")
+        for ax, column in zip(pair, (1, 0), strict=True):
+            ax.set(xlim=[end[column] for end in shown], ylim=[end[2] for end in shown])
+            ax.grid(alpha=0.3)
+    figure.legend([handles[label] for label in labels], labels, loc="outside lower center", ncols=len(labels))
+    return figure
 
 
 def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> None:

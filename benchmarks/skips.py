@@ -1,0 +1,353 @@
+"""What each skip saves: the same work with it and without it, timed in turn in one run.
+
+python benchmarks/skips.py [--side 512]   print the table
+python benchmarks/skips.py --write        and write its section of docs/accuracy.md
+
+The library has no switches: a skip is taken away from outside, or the scene is put so that it does not
+apply although it might.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import math
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from importlib import import_module
+from unittest.mock import patch
+
+import numpy as np
+import pages
+import scenes
+
+import fringetrace as ft
+from fringetrace import mm, nm
+from fringetrace.engine import build
+
+WAVE = 633 * nm
+ROUNDS = 5
+# Columns of paths that a skip might change.
+COLUMNS = ("ray", "fate", "bounces", "length", "origin", "direction", "amplitude", "key")
+
+
+@dataclass(frozen=True)
+class Skip:
+    """A rule that leaves work out.
+
+    `on` and `off` do the same work with it and without it; both return arrays to be compared.
+    """
+
+    name: str
+    scene: str
+    on: Callable[[], list[np.ndarray]]
+    off: Callable[[], list[np.ndarray]]
+
+
+def columns(paths: ft.Paths) -> list[np.ndarray]:
+    """What there is to compare of paths."""
+    return [getattr(paths, name) for name in COLUMNS]
+
+
+@contextlib.contextmanager
+def swapped(name: str, wrap: Callable, *rooms: str) -> Iterator[None]:
+    """Wrap a function of that name in all of some rooms that have it."""
+    there = [room for room in map(import_module, (f"fringetrace.{room}" for room in rooms))]
+    there = [room for room in there if hasattr(room, name)]
+    if not there:
+        raise LookupError(f"skips: expected {name} in one of {', '.join(rooms)}, got none")
+    with contextlib.ExitStack() as stack:
+        for room in there:
+            stack.enter_context(patch.object(room, name, wrap(getattr(room, name))))
+        yield
+
+
+def without(work: Callable, name: str, wrap: Callable, *rooms: str) -> Callable:
+    """Work that is done with a function wrapped."""
+
+    def off() -> list[np.ndarray]:
+        with swapped(name, wrap, *rooms):
+            return work()
+
+    return off
+
+
+def altered(scene: ft.Scene, change: Callable) -> ft.Scene:
+    """A scene whose bodies are changed."""
+    other = ft.Scene(scene.surfaces)
+    engine = build(other)
+    bodies = tuple(change(body) for body in engine.bodies)
+    for name, kept in other.derived.items():
+        if kept is engine:
+            other.derived[name] = replace(engine, bodies=bodies)
+    return other
+
+
+def tracing(scene: ft.Scene, beam: ft.Beam, ccd: ft.CCD | None = None) -> Callable:
+    """A trace on one thread, to be called."""
+    return lambda: columns(ft.trace(scene, beam, ccd, threads=1))
+
+
+def rods(side: int, open_: bool = False) -> tuple[ft.Scene, ft.Beam]:
+    """The rods of `scenes`, with or without the box around them."""
+    scene, beam = scenes.rods()
+    if open_:
+        lattice = ft.shapes.rod_lattice(20, 4, 65e-9, 280e-9, 2e-6)
+        lattice = lattice.moved(-lattice.bounds.mean(axis=0))
+        scene = ft.Scene([ft.Surface(lattice, ft.Mirror())])
+    return scene, replace(beam, shape=(side, side))
+
+
+def only_mirrors(side: int) -> Skip:
+    """One real pass over the rays a bounce, without amplitudes."""
+    work = tracing(*rods(side))
+    general = without(work, "_plan", lambda plan: lambda *a: replace(plan(*a), plain=False), "trace")
+    return Skip("only ideal mirrors: no amplitudes, one pass a bounce", "80 rods in a box", work, general)
+
+
+def in_place(side: int) -> Skip:
+    """No splitter: each ray has its row from the start."""
+    scene, beam = rods(side)
+
+    def chunks() -> list[np.ndarray]:
+        return columns(ft.paths.join(list(ft.stream(scene, beam, threads=1))))
+
+    return Skip(
+        "no ray splits: ends are written in their rows", "80 rods in a box", tracing(scene, beam), chunks
+    )
+
+
+def culled(side: int) -> Skip:
+    """Rays that pass a surface's box, or leave a plane, are not asked."""
+    bench = scenes.michelson(side)
+    work = tracing(bench.scene, bench.beam, bench.ccd)
+    all_ = without(work, "aim", lambda aim: lambda *a, **k: aim(*a, **{**k, "cull": False}), "engine")
+    return Skip("rays that miss all boxes, or leave a plane, are not asked", "Michelson", work, all_)
+
+
+def closed(side: int) -> Skip:
+    """In a closed body a miss, or a hit from behind, is wrong: no second opinions on the rest."""
+    scene, beam = rods(side)
+    doubting = altered(scene, lambda body: replace(body, closed=False))
+    return Skip(
+        "closed bodies: a miss tells itself",
+        "80 rods in a box",
+        tracing(scene, beam),
+        tracing(doubting, beam),
+    )
+
+
+class Undecided:
+    """Stands for Embree, and knows nothing."""
+
+    def run(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """No triangle is sure."""
+        return np.full(len(origin), -2, dtype=np.int32)
+
+
+def undecided(body):
+    """A body all of whose hits are decided by the float64 tree."""
+    other = replace(body)
+    vars(other)["embree"] = Undecided()
+    return other
+
+
+def doubted(side: int) -> Skip:
+    """The exact test, only where float32 is in doubt."""
+    scene, beam = rods(side)
+    exact = tracing(altered(scene, undecided), beam)
+    return Skip(
+        "exact decisions only where float32 is in doubt", "80 rods in a box", tracing(scene, beam), exact
+    )
+
+
+def dropped(side: int) -> Skip:
+    """Rays that have ended leave the batch; without, as many are asked in each pass as were launched."""
+    scene, beam = rods(side, open_=True)
+    scene = ft.Scene(
+        [*scene.surfaces, ft.Surface(ft.shapes.plate(1e-9, 1e-9).moved((0, 0, -1)), ft.Mirror())]
+    )
+
+    def asked(find: Callable) -> Callable:
+        first: list = []
+
+        def again(engine, batch, rows, hits, passed=frozenset()):
+            if not (batch.bounces[:rows] == 0).all():
+                finished = first[0] - rows
+                if finished:
+                    idle = ft.rays.part(first[1], 0, finished)
+                    find(engine, idle, finished, type(hits).blank(finished), passed)
+            else:
+                kept = {name: column[:rows].copy() for name, column in vars(batch).items()}
+                first[:] = [rows, type(batch)(**kept)]
+            return find(engine, batch, rows, hits, passed)
+
+        return again
+
+    work = tracing(scene, beam)
+    return Skip("finished rays leave the batch", "80 rods, open", work, without(work, "find", asked, "trace"))
+
+
+def unrecorded(side: int) -> Skip:
+    """Polylines only when asked for."""
+    scene, beam = rods(side)
+
+    def recorded() -> list[np.ndarray]:
+        return columns(ft.trace(scene, beam, threads=1, record=True))
+
+    return Skip("polylines only when asked for", "80 rods in a box", tracing(scene, beam), recorded)
+
+
+def uniform(side: int) -> Skip:
+    """A uniform beam brings no amplitudes along."""
+    scene = ft.Scene([ft.Surface(ft.shapes.plate(2.0, 2.0), ft.Mirror())])
+    beam = ft.Beam((0, 0, 1), (0, 0, -1), (0, 1, 0), (1, 1), (side, side))
+    ones = replace(beam, profile=lambda x, y: np.ones_like(x))
+    return Skip("uniform beams without amplitudes", "one mirror", tracing(scene, beam), tracing(scene, ones))
+
+
+def rephased(side: int) -> Skip:
+    """Another wavelength without another trace."""
+    bench = scenes.michelson(side)
+    paths = ft.trace(bench.scene, bench.beam, bench.ccd, threads=1)
+
+    def traced() -> list[np.ndarray]:
+        return [ft.complex_field(ft.trace(bench.scene, bench.beam, bench.ccd, threads=1), WAVE, "rays")]
+
+    return Skip(
+        "another wavelength from the same paths", "Michelson",
+        lambda: [ft.complex_field(paths, WAVE, "rays")], traced,
+    )  # fmt: skip
+
+
+def stepped(side: int) -> Skip:
+    """Phase steps without another trace or sum."""
+    flat = ft.shapes.plate(16 * mm, 16 * mm)
+
+    def tilted(piston: float = 0.0) -> ft.instruments.Bench:
+        return ft.instruments.michelson(
+            flat, aperture=6 * mm, pixels=(side, side), reference_tilt=(2e-5, 0.0), piston=piston
+        )
+
+    def once() -> list[np.ndarray]:
+        return list(tilted().phase_steps(WAVE, 4))
+
+    def moved() -> list[np.ndarray]:
+        # 2 piston is the path that a step adds
+        return [tilted(0.125 * WAVE * k).phase_steps(WAVE, 4)[0] for k in range(4)]
+
+    return Skip("four phase steps from the same fields", "Michelson", once, moved)
+
+
+def differences(side: int) -> Skip:
+    """Irradiance needs the fringes between waves resolved, not the waves themselves."""
+    tilt, pixels = 20e-3, max(8, side // 4)
+    flat = ft.shapes.plate(16 * mm, 16 * mm)
+    turn = ft.vectors.rotation((0, 1, 0), tilt)
+    bench = ft.instruments.michelson(
+        flat.moved(turn=turn), aperture=6 * mm, pixels=(pixels, pixels), reference_tilt=(tilt, 0.0)
+    )
+    paths = ft.trace(bench.scene, replace(bench.beam, shape=(12, 12)), bench.ccd)
+
+    def image() -> list[np.ndarray]:
+        return [ft.irradiance(paths, WAVE)]
+
+    rooms = ("sheets", "regions", "field", "quadrature")
+    carrier = without(image, "fringes", lambda real: lambda slope, _: real(slope, True), *rooms)
+    return Skip("irradiance: sampled for fringes, not for the carrier", "tilted flats", image, carrier)
+
+
+def imported(side: int) -> Skip:
+    """Heavy libraries at first use."""
+    heavy = "trimesh, prysm, skimage.restoration, xarray, tifffile, matplotlib.figure, pyvista, rich.console"
+
+    def fresh(line: str) -> Callable:
+        def run() -> list[np.ndarray]:
+            subprocess.run([sys.executable, "-c", line], check=True)
+            return []
+
+        return run
+
+    return Skip(
+        "heavy libraries are imported at first use", "`import fringetrace`",
+        fresh("import fringetrace"), fresh(f"import fringetrace, {heavy}"),
+    )  # fmt: skip
+
+
+SKIPS: dict[str, Callable[[int], Skip]] = {
+    case.__name__: case
+    for case in (
+        only_mirrors, in_place, culled, closed, doubted, dropped, unrecorded, uniform, rephased, stepped,
+        differences, imported,
+    )
+}  # fmt: skip
+
+
+def same(one: list[np.ndarray], other: list[np.ndarray]) -> str:
+    """How alike two results are: to the bit, or by how much, relative to the root of the mean square."""
+    if all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, other, strict=True)):
+        return "to the bit" if one else ""
+    worst = 0.0
+    for a, b in zip(one, other, strict=True):
+        if a.shape != b.shape or (a.dtype.kind in "iu" and (a != b).any()):
+            return "no"
+        scale = math.sqrt(np.mean(np.abs(b) ** 2)) if a.dtype.kind in "fc" else 0.0
+        if scale:
+            worst = max(worst, math.sqrt(np.mean(np.abs(a - b) ** 2)) / scale)
+    return f"to {worst:.0e} rms"
+
+
+def measured(case: Skip, rounds: int = ROUNDS) -> tuple[float, float, str]:
+    """Median seconds with and without a skip, taken in turn, and how alike the results are."""
+    alike = same(case.on(), case.off())
+    times: tuple[list[float], list[float]] = ([], [])
+    for _ in range(rounds):
+        for work, seconds in zip((case.on, case.off), times, strict=True):
+            begin = time.perf_counter()
+            work()
+            seconds.append(time.perf_counter() - begin)
+    on, off = (statistics.median(seconds) for seconds in times)
+    return on, off, alike
+
+
+SECTION = """## What each skip saves
+
+The same work with a rule that leaves something out and without it, one thread, made by
+`benchmarks/skips.py --write`: medians of {rounds} runs in turn, {rays} rays.
+
+"""
+
+
+def table(side: int, rounds: int = ROUNDS) -> str:
+    """All skips as a Markdown table."""
+    lines = [
+        "| skip | scene | on, s | off, s | same results | off / on |",
+        "|---|---|---|---|---|---|",
+    ]
+    for case in (make(side) for make in SKIPS.values()):
+        on, off, alike = measured(case, rounds)
+        lines.append(f"| {case.name} | {case.scene} | {on:.3f} | {off:.3f} | {alike} | {off / on:.2f} |")
+        print(lines[-1], flush=True)
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Print the table; write the section if asked to."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--side", type=int, default=512, help="rays along either side of a beam")
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
+    parser.add_argument("--write", action="store_true")
+    chosen = parser.parse_args()
+    text = table(chosen.side, chosen.rounds)
+    if chosen.write:
+        pages.write("skips", SECTION.format(rounds=chosen.rounds, rays=f"{chosen.side**2:,}") + text)
+
+
+if __name__ == "__main__":
+    main()
