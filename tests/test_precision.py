@@ -1,5 +1,6 @@
 """Work-precision runs: errors against known fields, how they fall, what is written. No time decides."""
 
+import importlib.util
 import json
 import math
 import sys
