@@ -16,14 +16,20 @@ from fringetrace.triangles import weld
 from fringetrace.vectors import unit
 from fringetrace.waves import Array, FloatArray
 
-# Rays go by an edge this many cells to either side of it, this far apart along it, and keep this part
-# of its length from its ends.
-SIDE, SPACING, END = 1e-3, 0.5, 0.02
+# Rays go by an edge this many cells to either side of it and within its ends, so far apart along it.
+SIDE, SPACING = 1e-3, 0.5
 # Leads that are asked which ray comes nearest to a point, and steps from there.
 LEADS, STEPS = 64, 4
+# Steps along columns and rows that are this near to one line (sine squared) lead nowhere.
+LOST = 1e-12
+# Cells that a leg is carried on beyond its nodes.
+NEAR = 1.5
 # A leg's own start is known to this part of the scene's size. What it passes or meets does not lie
 # farther beyond its end than this part of its length.
 START, SLACK = 1e-9, 0.05
+
+
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +115,7 @@ class Leg:
     reach: FloatArray
     steps: FloatArray
 
-    def nearest(self, points: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    def nearest(self, points: FloatArray) -> tuple[FloatArray, Mask, Mask]:
         """Where on the beam's grid the light starts that comes by points, by linear steps between nodes.
 
         Parameters
@@ -120,28 +126,41 @@ class Leg:
         -------
         at : (n, 2) float64
             Columns and rows, in cells; on the grid or beside it.
-        there : (n,) bool
-            Whether the points lie between the leg's ends.
+        there, near : (n,) bool
+            Whether the points lie between the leg's ends, and whether a node is near.
         """
-        lead = np.unique(np.linspace(0, len(self.nodes) - 1, LEADS).astype(np.int64))
+        parallel = bool((self.direction == self.direction[0]).all())
+        leads = 1 if parallel else LEADS
+        lead = np.unique(np.linspace(0, len(self.nodes) - 1, leads).astype(np.int64))
         off = points[:, None] - self.start[lead]
         along = np.einsum("pnk,nk->pn", off, self.direction[lead])
         node = lead[np.argmin((off**2).sum(axis=-1) - along**2, axis=1)]
         rows, columns = self.number.shape
-        for _ in range(STEPS):
+        for _ in range(2 if parallel else STEPS):
             off, direction = points - self.start[node], self.direction[node]
             along = np.einsum("pk,pk->p", off, direction)
             slope = self.steps[node, :, :3] + along[:, None, None] * self.steps[node, :, 3:]
             slope -= np.einsum("pik,pk->pi", slope, direction)[..., None] * direction[:, None]
             miss = off - along[:, None] * direction
-            at = self.nodes[node] + np.einsum("pk,pki->pi", miss, np.linalg.pinv(slope))
+            at = self.nodes[node] + _solved(slope, miss)
             near = np.rint(np.clip(at, 0, (columns - 1, rows - 1))).astype(np.int64)
             number = self.number[near[:, 1], near[:, 0]]
             final = node
             node = np.where(number >= 0, number, node)
         there = along > START * np.abs(points).max(initial=0.0)
         there &= along < (1.0 + SLACK) * self.reach[final]
-        return np.asarray(at, dtype=np.float64), there
+        near = (np.abs(at - self.nodes[final]) <= NEAR).all(axis=1)
+        return np.asarray(at, dtype=np.float64), there, np.asarray(near)
+
+
+def _solved(slope: FloatArray, miss: FloatArray) -> FloatArray:
+    """Steps (n, 2) whose slopes (n, 2, 3) come nearest to (n, 3); none where a slope is lost."""
+    (a, b), (_, c) = np.moveaxis(np.einsum("pik,pjk->pij", slope, slope), 0, -1)
+    u, v = np.einsum("pik,pk->ip", slope, miss)
+    bend = a * c - b * b
+    with np.errstate(divide="ignore", invalid="ignore"):
+        step = np.stack([c * u - b * v, a * v - b * u], axis=1) / bend[:, None]
+    return np.where((bend > LOST * a * c)[:, None], step, 0.0)
 
 
 def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[Leg]:
@@ -192,19 +211,22 @@ def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[Leg]:
 
 def _leg(lines: FloatArray, ray: Array, shape: tuple[int, int]) -> Leg | None:
     """A leg of rays with starts, directions and lengths (n, 7); None where too few are neighbours."""
-    table = np.full((shape[0] * shape[1], 7), np.nan)
-    table[ray] = lines
-    grid = table.reshape(*shape, 7)
+    row, column = np.divmod(ray, shape[1])
+    top, left = int(row.min()), int(column.min())
+    grid = np.full((int(row.max()) + 1 - top, int(column.max()) + 1 - left, 7), np.nan)
+    grid[row - top, column - left] = lines
     steps = along_grid(grid[..., :6])
     known = np.isfinite(steps).all(axis=(2, 3))
     if not known.any():
         return None
-    number = np.where(known, np.cumsum(known).reshape(shape) - 1, -1)
-    nodes = np.argwhere(known)[:, ::-1]
-    return Leg(nodes, number, grid[known, :3], grid[known, 3:6], grid[known, 6], steps[known])
+    nodes = np.argwhere(known)
+    number = np.full(shape, -1)
+    number[nodes[:, 0] + top, nodes[:, 1] + left] = np.arange(len(nodes))
+    place = nodes[:, ::-1] + (left, top)
+    return Leg(place, number, grid[known, :3], grid[known, 3:6], grid[known, 6], steps[known])
 
 
-def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, Mask]:
     """Places on a beam's grid from which light comes by the edges of meshes, on either side of them.
 
     Found from the legs of the rays from the nodes: exactly where these are parallel, else to second
@@ -239,9 +261,9 @@ def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray,
     return at, on
 
 
-def _along(leg: Leg, ends: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+def _along(leg: Leg, ends: FloatArray) -> tuple[FloatArray, Mask]:
     """Places beside edges (n, 2, 3) of meshes that a leg comes by, as `beside`."""
-    at, there = leg.nearest(ends.reshape(-1, 3))
+    at, there, _ = leg.nearest(ends.reshape(-1, 3))
     at, there = at.reshape(-1, 2, 2), there.reshape(-1, 2)
     size = np.array(leg.number.shape[::-1]) - 1.0
     begin, end = _clipped(at, size)
@@ -252,14 +274,14 @@ def _along(leg: Leg, ends: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_
     count = np.ceil((end - begin) * length / SPACING).astype(np.int64) + 1
     edge = np.repeat(np.arange(len(count)), count)
     number = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
-    f = END + (1.0 - 2.0 * END) * number / (count[edge] - 1)
+    margin = np.minimum(SIDE / ((end - begin) * length), 0.25)[edge]
+    f = margin + (1.0 - 2.0 * margin) * number / (count[edge] - 1)
     f = (begin[edge] + f * (end - begin)[edge])[:, None]
-    at, _ = leg.nearest(ends[edge, 0] * (1.0 - f) + ends[edge, 1] * f)
+    at, _, near = leg.nearest(ends[edge, 0] * (1.0 - f) + ends[edge, 1] * f)
     across = SIDE * np.stack([-tangent[:, 1], tangent[:, 0]], axis=1)[edge]
     both = np.concatenate([at - across, at + across])
     on = np.tile(number + 1 < count[edge], 2)
-    # none of what has strayed from the grid
-    inside = np.asarray(((both > 0.0) & (both < size)).all(axis=1))
+    inside = np.asarray(((both > 0.0) & (both < size)).all(axis=1) & np.tile(near, 2))
     on &= np.append(inside[1:], False)
     return both[inside], on[inside]
 

@@ -216,13 +216,15 @@ def _differing(paths: Paths, nodes: Paths, ccd: CCD, shape: tuple[int, int]) -> 
 
 
 def _witnesses(wave: int, ray: Array, at: FloatArray, goes_on: Mask, shape: tuple[int, int]) -> Witnesses:
-    """What a sequence, lit by some rays, is at places (n, 2) between the nodes, where the nodes differ."""
+    """What a sequence, lit by some rays, is at places (n, 2) in cells whose corners do not tell it all."""
     count = shape[0] * shape[1]
     lit = np.zeros(len(at), dtype=np.bool_)
     lit[ray[ray >= count] - count] = True
-    corners = _corners(ray[ray < count], shape)[tuple(_cell(at, (shape[0] - 1, shape[1] - 1)))]
-    differs = np.where(lit, ~corners.all(axis=1), corners.any(axis=1))
+    nodes = _corners(ray[ray < count], shape)
+    cell = tuple(_cell(at, (shape[0] - 1, shape[1] - 1)))
+    differs = np.zeros(nodes.shape[:2], dtype=np.bool_)
+    np.logical_or.at(differs, cell, np.where(lit, ~nodes[cell].all(axis=1), nodes[cell].any(axis=1)))
     to = np.arange(len(at))
     to[:-1] += goes_on[:-1] & (lit[1:] == lit[:-1])
-    kept = differs | differs[to]
+    kept = differs[cell] | differs[cell][to]
     return Witnesses(np.full(kept.sum(), wave), at[kept], at[to[kept]], lit[kept])
