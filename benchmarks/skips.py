@@ -254,7 +254,7 @@ def differences(side: int) -> Skip:
     paths = ft.trace(bench.scene, replace(bench.beam, shape=(12, 12)), bench.ccd)
 
     def image() -> list[np.ndarray]:
-        return [ft.irradiance(paths, WAVE)]
+        return [ft.irradiance(paths, WAVE, "wavefront")]
 
     rooms = ("sheets", "regions", "field", "quadrature")
     carrier = without(image, "fringes", lambda real: lambda slope, _: real(slope, True), *rooms)
