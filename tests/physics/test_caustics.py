@@ -79,37 +79,39 @@ def across():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("rays", "off"), [(65, 1.5e-3), (257, 1.3e-3)])
+@pytest.mark.parametrize(("rays", "off"), [(65, 2e-3), (257, 2e-3)])
 def test_the_field_across_a_fold(across, rays, off):
-    """Airy's function to .1 % of the peak, dark side included; rays alone are 5 / 72 zeta off, or infinite."""
+    """Airy's function to .1 % of the peak, dark side included. Rays would be infinite.
+
+    Beyond 12 widths they add as rays, off by up to 5 / 72 of 2/3 12^(3/2): .25 % of them, .16 % of the peak.
+    """
     x, z, pitch, field, irradiance = across
     found, bright = image(x, z, pitch, one_side, rays)
     peak = abs(field).max()
     error = abs(found - field) / peak
     assert error.max() < off
-    assert error[-20:].max() < off / 2  # the dark side
-    assert abs(field[-20:]).max() > 0.4 * peak  # is not dark at first
-    assert abs(bright - irradiance).max() < 2 * off * peak**2
+    # what 65 rays leave of the path's interpolation; with 257, 2e-5
+    assert error[-20:].max() < off * (0.75 if rays == 65 else 0.03)
+    assert abs(field[-20:]).max() > 0.4 * peak  # the dark side is not dark at first
+    assert abs(bright - irradiance).max() < off * peak**2
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wide", [4, 8, 20])
+@pytest.mark.parametrize("wide", [4, 10, 50])
 def test_a_pixel_that_holds_a_fold(across, wide):
-    """Irradiance averaged over pixels of 1, 2 and 5 Airy widths, the fold in one of them or between two."""
+    """Irradiance averaged over pixels of 1, 2.5 and 12.5 Airy widths, the fold in one of them or between two."""
     x, z, pitch, _, irradiance = across
     reference = irradiance.reshape(-1, wide).mean(axis=1)
     _, bright = image(x.reshape(-1, wide).mean(axis=1), z, pitch * wide, one_side, 257)
-    assert abs(bright - reference).max() < 1e-3 * reference.max()
+    assert abs(bright - reference).max() < 2e-4 * reference.max()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("t", "off"), [(0.2, 2.5e-3), (0.15, 2e-3), (0.1, 6e-3), (0.06, 0.07), (0.045, 0.25)]
-)
+@pytest.mark.parametrize(("t", "off"), [(0.15, 2e-3), (0.1, 6e-3), (0.06, 0.07), (0.045, 0.25)])
 def test_towards_a_cusp_two_folds_meet(t, off):
-    """A branch that two folds part from others: .2 % of the peak where they are 8 Airy widths apart or more.
+    """A branch that two folds part from others: .2 % of the peak where they are 17 Airy widths apart.
 
-    The folds of t = .2, .15, .1, .06, .045 are 34, 17, 6, 1.6, .7 Airy widths apart. Two waves are
+    Those of t = .15, .1, .06, .045 are 17, 6, 1.6, .7 Airy widths apart. Two waves are
     no picture of the third then: Pearcey's function would be.
     """
     edge, z = fold(t)
