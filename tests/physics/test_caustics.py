@@ -99,7 +99,7 @@ def test_the_field_across_a_fold(across, rays, off):
 @pytest.mark.slow
 @pytest.mark.parametrize("wide", [4, 10, 50])
 def test_a_pixel_that_holds_a_fold(across, wide):
-    """Irradiance over pixels of 1, 2.5 and 12.5 Airy widths, the fold in one of them or between two."""
+    """Irradiance averaged over pixels of 1, 2.5 and 12.5 Airy widths, with the fold in or between them."""
     x, z, pitch, _, irradiance = across
     reference = irradiance.reshape(-1, wide).mean(axis=1)
     _, bright = image(x.reshape(-1, wide).mean(axis=1), z, pitch * wide, one_side, 257)
