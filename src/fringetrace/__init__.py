@@ -9,7 +9,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fringetrace.bounds import Bounds, bounds
+from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance
+from fringetrace.guards import FringetraceWarning
 from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -26,7 +29,10 @@ __all__ = [
     "Absorber",
     "Beam",
     "BeamSplitter",
+    "Bounds",
+    "Budget",
     "Fate",
+    "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
@@ -35,6 +41,8 @@ __all__ = [
     "Rays",
     "Scene",
     "Surface",
+    "bounds",
+    "budget",
     "complex_field",
     "degree",
     "forms",

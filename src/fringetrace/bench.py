@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace import phase
+from fringetrace import guards, phase
+from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field
 from fringetrace.paths import Paths
 from fringetrace.scene import CCD, Beam, Scene
@@ -165,9 +166,36 @@ class Bench:
         -------
         (rows, columns) float64
             1 where a beam of unit irradiance would fall straight on the CCD.
+
+        Warns
+        -----
+        FringetraceWarning
+            Where fringes alias, pixels starve or waves fold, see `fringetrace.guards`.
         """
+        guards.check(self.trace(), wavelength)
         modulus_of_field = np.abs(self.field(wavelength))
         return np.asarray(modulus_of_field if modulus else modulus_of_field**2, dtype=np.float64)
+
+    def budget(self, wavelength: float) -> Budget:
+        """What rounding, facets, rays and pixels cost the image, in waves.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+
+        Returns
+        -------
+        Budget
+
+        Warns
+        -----
+        FringetraceWarning
+            As `interferogram`, and where facets cost over 1/20 wave.
+        """
+        guards.check(self.trace(), wavelength)
+        costs = budget(self.trace(), wavelength)
+        guards.check_budget(costs)
+        return costs
 
     def phase_steps(self, wavelength: float, steps: int = 4) -> FloatArray:
         """Frames of a phase-stepped recording: frame k adds 2 pi k / steps to the reference.

@@ -98,7 +98,7 @@ def legs(paths: Paths) -> tuple[Array, Array]:
 
 
 def _corners(bounces: Met) -> FloatArray:
-    """Corners (n, 3, 3) of the facets met, first the ends of the shortest side: a needle's normal needs that."""
+    """Corners (n, 3, 3) of the facets met, first those of the shortest side: good for normals of needles."""
     corners = bounces.surface.mesh.vertices[bounces.surface.mesh.faces[bounces.face]]
     sides = ((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2)
     order = (np.argmin(sides, axis=1)[:, None] + np.arange(3)) % 3
@@ -265,13 +265,14 @@ def rounding(paths: Paths) -> FloatArray:
     assert paths.points is not None
     if isinstance(paths.source, Beam):  # the phase is 0 on its rectangle
         start = paths.points[:, 0].astype(EXTENDED) - paths.source.centre
-        error -= (start * direction[:, 0]).sum(axis=1)
-    else:
+        along = paths.source.axes[2].astype(EXTENDED)
+        error -= start @ (along / np.sqrt((along**2).sum()))
+    elif paths.source.length is not None:
         error -= paths.source.length[paths.ray]
     if paths.ccd is not None:
         seen = np.flatnonzero(paths.fate == Fate.DETECTED)
         normal = paths.ccd.axes[2].astype(EXTENDED)
-        beyond = (paths.origin[seen] - paths.ccd.centre) @ normal - paths.ccd.focus
+        beyond = (paths.origin[seen].astype(EXTENDED) - paths.ccd.centre) @ normal - paths.ccd.focus
         facing = direction[seen, paths.bounces[seen]] @ normal
         error[seen] += beyond * facing
     return np.asarray(error, dtype=np.float64)

@@ -75,8 +75,9 @@ def bounds(paths: Paths) -> Bounds:
     ValueError
         If the trace did not record them.
     """
+    rows = np.arange(len(paths))
     starts = range(0, max(len(paths), 1), CHUNK)
-    parts = [_carried(paths.where(slice(start, start + CHUNK))) for start in starts]
+    parts = [_carried(paths.where(rows[start : start + CHUNK])) for start in starts]
     return Bounds(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 

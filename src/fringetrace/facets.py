@@ -91,11 +91,14 @@ def _corner_normals(vertices: FloatArray, faces: IndexArray, used: IndexArray) -
     here = corners[face, corner]
     one, other = corners[face, corner - 2] - here, corners[face, corner - 1] - here
     share = np.cross(one, other) / (dot(one, one) * dot(other, other))[:, None]
-    total = np.stack([np.bincount(owner, share[:, axis], len(mine)) for axis in range(3)], axis=1)
+    columns = [np.bincount(owner, share[:, axis], len(mine)) for axis in range(3)]
+    total = np.stack(columns, axis=1).astype(np.float64)
     return unit(total).reshape(-1, 3, 3)
 
 
-def _barycentric(corners: FloatArray, normal: FloatArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _barycentric(
+    corners: FloatArray, normal: FloatArray, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Weights (n, 3) of points in triangles, and their gradients (n, 3, 3)."""
     rise = []
     for k in range(3):
