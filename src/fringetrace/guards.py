@@ -199,7 +199,8 @@ def costly(budget: Budget) -> str | None:
     finer = np.sqrt(budget.facets / COSTLY)
     return (
         f"facets cost {budget.facets:.2g} waves rms, over 1/20: those of {name!r} up to {worst:.2g}; if they "
-        f"stand for a smooth surface, give it a form, such as forms.Smooth(), or facets {finer:.1f} times as small"
+        "stand for a smooth surface, give it a form, such as forms.Smooth(), or facets "
+        f"{finer:.1f} times as small"
     )
 
 

@@ -109,10 +109,11 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
 
 
 def spread(paths: Paths, wavelength: float) -> Paths:
-    """Rays that stand for the mean of their plane wave over the pixel that they fall in.
+    """Rays that stand for the mean of their plane wave over their part of the pixel that they fall in.
 
-    Each is continued to the centre of the pixel, L + d . (centre - point), and has its amplitude times
-    sinc of the cycles over the pixel, along either side.
+    Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
+    part, L + d . (centre - point), and has its amplitude times sinc of the cycles over the part,
+    along either side.
 
     Parameters
     ----------
@@ -125,16 +126,18 @@ def spread(paths: Paths, wavelength: float) -> Paths:
     Paths
     """
     assert paths.ccd is not None
-    pitch, (u, v, _) = paths.ccd.pitch, paths.ccd.axes
-    at = paths.pixel
-    shift = (np.floor(at) + 0.5 - at) * pitch
+    assert paths.area is not None
+    parts = max(1, round(paths.ccd.pitch / math.sqrt(paths.area)))
+    part, (u, v, _) = paths.ccd.pitch / parts, paths.ccd.axes
+    at = paths.pixel * parts
+    shift = (np.floor(at) + 0.5 - at) * part
     slope = np.stack([paths.direction @ v, paths.direction @ u], axis=1)
-    mean = np.sinc(slope * (pitch / wavelength)).prod(axis=1)
+    mean = np.sinc(slope * (part / wavelength)).prod(axis=1)
     return replace(paths, length=paths.length + (shift * slope).sum(axis=1), amplitude=paths.amplitude * mean)
 
 
 def offset_error(paths: Paths, wavelength: float) -> float:
-    """What it costs the ray sum that a ray counts where it lands, not with its mean over the pixel.
+    """What it costs the ray sum that a ray counts where it lands, not by its mean over part of the pixel.
 
     Parameters
     ----------
@@ -175,12 +178,13 @@ def count_error(paths: Paths, wavelength: float) -> float:
     assert coarse.ccd is not None
     at = pixels(coarse.ccd, coarse.origin)
     inside = np.asarray(((at >= 0.0) & (at < coarse.ccd.shape)).all(axis=1))
-    coarse = spread(coarse.where(inside), wavelength)
+    coarse = coarse.where(inside)
     row, column = np.divmod(coarse.ray, paths.source.shape[1])
     few = coarse.where(_even(row) & _even(column))
     assert few.area is not None
     few = replace(few, area=4.0 * few.area)
-    return _difference([complex_field(coarse, wavelength, "rays")], [complex_field(few, wavelength, "rays")])
+    fields = [complex_field(spread(part, wavelength), wavelength, "rays") for part in (coarse, few)]
+    return _difference(fields[:1], fields[1:])
 
 
 def _even(number: Array) -> npt.NDArray[np.bool_]:
