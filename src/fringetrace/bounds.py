@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.bounces import curvature, legs, met, normals
 from fringetrace.paths import Fate, Paths
 from fringetrace.waves import FloatArray, checked_wavelength
 
@@ -83,6 +82,8 @@ def bounds(paths: Paths) -> Bounds:
 
 def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
     """`Bounds` of some paths. Rows and columns of the covariance: position, direction, optical path."""
+    from fringetrace.bounces import legs
+
     normal, bend = _tables(paths)
     length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
     assert paths.points is not None
@@ -114,6 +115,8 @@ def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _tables(paths: Paths) -> tuple[FloatArray, FloatArray]:
     """Normal (m, b, 3) and curvature (m, b, 3, 3) at each bounce; at least one column."""
+    from fringetrace.bounces import curvature, met, normals
+
     depth = max(1, int(paths.bounces.max(initial=0)))
     normal, bend = np.zeros((len(paths), depth, 3)), np.zeros((len(paths), depth, 3, 3))
     for bounces in met(paths):

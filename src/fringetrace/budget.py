@@ -8,9 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fringetrace.bounces import flattened, legs, met, rounding, shifted
 from fringetrace.paths import Fate, Paths
-from fringetrace.sampling import count_error, offset_error, quadrature_error, sampling_error
 from fringetrace.scene import Beam
 from fringetrace.trace import trace
 from fringetrace.waves import Array, FloatArray, checked_wavelength
@@ -100,6 +98,8 @@ def budget(paths: Paths, wavelength: float, method: str = "rays") -> Budget:
     ValueError
         For paths without a CCD or not of a beam, a wavelength that is none, an unknown method.
     """
+    from fringetrace import sampling
+
     checked_wavelength(wavelength)
     if paths.ccd is None:
         raise ValueError("budget: expected paths traced onto a CCD, got paths without one")
@@ -110,12 +110,14 @@ def budget(paths: Paths, wavelength: float, method: str = "rays") -> Budget:
     probes = again(paths, _within(paths.source.shape, PROBES), record=True).detected
     facets, costliest = facet_error(probes, wavelength)
     if method == "rays":
-        sampling, pixel = count_error(paths, wavelength), offset_error(paths, wavelength)
+        rays = sampling.count_error(paths, wavelength)
+        pixel = sampling.offset_error(paths, wavelength)
     else:
         grids = list(_halved(paths))
         steps = math.log2(max(paths.source.shape) / max(_shape(grids[0])))
-        sampling, pixel = sampling_error(grids, wavelength, steps), quadrature_error(grids[0], wavelength)
-    return Budget(hit_error(probes, wavelength), facets, sampling, pixel, wavelength, method, costliest)
+        rays = sampling.sampling_error(grids, wavelength, steps)
+        pixel = sampling.quadrature_error(grids[0], wavelength)
+    return Budget(hit_error(probes, wavelength), facets, rays, pixel, wavelength, method, costliest)
 
 
 def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
@@ -178,6 +180,8 @@ def hit_error(paths: Paths, wavelength: float) -> float:
     -------
     float, waves, rms over the power
     """
+    from fringetrace.bounces import rounding
+
     return _rms(rounding(paths) / wavelength, np.abs(paths.amplitude) ** 2)
 
 
@@ -201,6 +205,8 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
     (name, float) or None
         The surface that costs most, and the largest error of a path by it, in waves.
     """
+    from fringetrace.bounces import flattened, legs, met, shifted
+
     length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
     onward = np.cumsum(length[:, ::-1], axis=1)[:, ::-1]
     narrow = narrowed(paths)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.budget import Budget
 from fringetrace.paths import Paths
 from fringetrace.scene import CCD, Beam
 from fringetrace.waves import Array, FloatArray, checked_wavelength
+
+if TYPE_CHECKING:
+    from fringetrace.budget import Budget
 
 # Facets may cost this many waves, at the rms.
 COSTLY = 1.0 / 20.0
