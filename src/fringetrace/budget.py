@@ -19,6 +19,8 @@ PROBES = 53
 ENOUGH, NARROWEST = 9, 1e-3
 # Rays along the longer side of the finest grid that is halved for the wavefront method.
 FINEST = 128
+# Fewer rays are doubled first: a quarter of them would have too few neighbours for the method's order.
+FEWEST = 20
 # What the terms say of themselves.
 CAUSES = {
     "hit": "rounding of hits and paths in float64",
@@ -156,6 +158,8 @@ def _within(shape: tuple[int, int], most: int) -> tuple[int, int]:
 def _halved(paths: Paths) -> Iterator[Paths]:
     """Three grids of rays, each with half as many either way as the one before."""
     shape = _within(_shape(paths), FINEST)
+    if max(shape) < FEWEST:
+        shape = 2 * shape[0], 2 * shape[1]
     yield paths if shape == _shape(paths) else again(paths, shape, paths.points is not None)
     for part in (2, 4):
         fewer = (max(1, round(shape[0] / part)), max(1, round(shape[1] / part)))

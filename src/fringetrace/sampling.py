@@ -44,7 +44,8 @@ def bands(ccd: CCD) -> list[CCD]:
     rows, columns = ccd.shape
     if rows <= ROWS * len(BANDS):
         return [ccd]
-    return [_cut(ccd, round(part * rows - 0.5 * ROWS), ROWS, columns) for part in BANDS]
+    tops = [round(min(max(part * rows - 0.5 * ROWS, 0.0), rows - ROWS)) for part in BANDS]
+    return [_cut(ccd, top, ROWS, columns) for top in tops]
 
 
 def _cut(ccd: CCD, row: int, rows: int, columns: int, size: int = 1) -> CCD:
