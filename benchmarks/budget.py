@@ -29,7 +29,7 @@ HENE = 632.8 * nm
 MIRROR = ft.Mirror()
 # An estimate may be this much below the truth, and above it.
 BELOW, ABOVE = 0.5, 10.0
-# Points in a pixel are chosen to be off by 1e-6 of the field at most: below, estimates are no more than bounds.
+# Points in a pixel are chosen to be off by 1e-6 of the field at most; below, estimates are only bounds.
 FLOOR = 1e-6 / (2 * math.pi)
 
 
