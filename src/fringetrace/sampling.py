@@ -18,6 +18,8 @@ from fringetrace.waves import Array, ComplexArray
 # Bands of the image that stand for all of it: their middles, in parts of its height, and pixel rows in each.
 BANDS = (0.1, 0.5, 0.9)
 ROWS = 4
+# Pixel rows in each band for the ray sum, which has more to average.
+MANY = 24
 # By halving the ray spacing an error falls as it is seen to, but no less than by 3 nor more than by 2^4.
 LEAST_FALL, MOST_FALL = 3.0, 16.0
 
@@ -29,12 +31,14 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
     return math.sqrt(off / all_) / (2.0 * math.pi) if all_ > 0.0 else 0.0
 
 
-def bands(ccd: CCD) -> list[CCD]:
+def bands(ccd: CCD, height: int = ROWS) -> list[CCD]:
     """Parts of a CCD that stand for all of it: some rows near its lower end, its middle, its upper end.
 
     Parameters
     ----------
     ccd : CCD
+    height : int
+        Rows of each.
 
     Returns
     -------
@@ -42,10 +46,17 @@ def bands(ccd: CCD) -> list[CCD]:
         The whole, if it has few rows.
     """
     rows, columns = ccd.shape
-    if rows <= ROWS * len(BANDS):
+    if rows <= height * len(BANDS):
         return [ccd]
-    tops = [round(min(max(part * rows - 0.5 * ROWS, 0.0), rows - ROWS)) for part in BANDS]
-    return [_cut(ccd, top, ROWS, columns) for top in tops]
+    tops = [round(min(max(part * rows - 0.5 * height, 0.0), rows - height)) for part in BANDS]
+    return [_cut(ccd, top, height, columns) for top in tops]
+
+
+def _onto(paths: Paths, ccd: CCD) -> Paths:
+    """The paths that arrive on a part of their CCD, as they are seen there."""
+    at = pixels(ccd, paths.origin)
+    inside = np.asarray(((at >= 0.0) & (at < ccd.shape)).all(axis=1))
+    return replace(paths.where(inside), ccd=ccd)
 
 
 def _cut(ccd: CCD, row: int, rows: int, columns: int, size: int = 1) -> CCD:
@@ -149,9 +160,11 @@ def offset_error(paths: Paths, wavelength: float) -> float:
     -------
     float, waves; see `budget.Budget`
     """
+    assert paths.ccd is not None
     seen = paths.detected
-    mean = complex_field(spread(seen, wavelength), wavelength, "rays")
-    return _difference([mean], [complex_field(seen, wavelength, "rays")])
+    parts = [_onto(seen, ccd) for ccd in bands(paths.ccd, MANY)]
+    means = [complex_field(spread(part, wavelength), wavelength, "rays") for part in parts]
+    return _difference(means, [complex_field(part, wavelength, "rays") for part in parts])
 
 
 def count_error(paths: Paths, wavelength: float) -> float:
@@ -172,20 +185,19 @@ def count_error(paths: Paths, wavelength: float) -> float:
     """
     assert paths.ccd is not None
     assert isinstance(paths.source, Beam)
-    rows, columns = (n - n % 2 for n in paths.ccd.shape)
-    if rows == 0 or columns == 0:
-        return 0.0
-    coarse = replace(paths, ccd=_cut(paths.ccd, 0, rows, columns, size=2)).detected
-    assert coarse.ccd is not None
-    at = pixels(coarse.ccd, coarse.origin)
-    inside = np.asarray(((at >= 0.0) & (at < coarse.ccd.shape)).all(axis=1))
-    coarse = coarse.where(inside)
-    row, column = np.divmod(coarse.ray, paths.source.shape[1])
-    few = coarse.where(_even(row) & _even(column))
-    assert few.area is not None
-    few = replace(few, area=4.0 * few.area)
-    fields = [complex_field(spread(part, wavelength), wavelength, "rays") for part in (coarse, few)]
-    return _difference(fields[:1], fields[1:])
+    seen, fields, others = paths.detected, [], []
+    for ccd in bands(paths.ccd, MANY):
+        rows, columns = (n - n % 2 for n in ccd.shape)
+        if rows == 0 or columns == 0:
+            return 0.0
+        all_ = _onto(seen, _cut(ccd, 0, rows, columns, size=2))
+        row, column = np.divmod(all_.ray, paths.source.shape[1])
+        few = all_.where(_even(row) & _even(column))
+        assert few.area is not None
+        few = replace(few, area=4.0 * few.area)
+        fields.append(complex_field(spread(all_, wavelength), wavelength, "rays"))
+        others.append(complex_field(spread(few, wavelength), wavelength, "rays"))
+    return _difference(fields, others)
 
 
 def _even(number: Array) -> npt.NDArray[np.bool_]:
