@@ -29,7 +29,7 @@ class Bounds:
     direction : (m,) float64, radians
     length : (m,) float64, metres
         Of its optical path. Where the end has moved along the wave, the phase there has changed with
-        it: the field stays right for longer, see `fringetrace.bounces.rounding`.
+        it: the field stays right for longer, see `fringetrace.contacts.rounding`.
     """
 
     position: FloatArray
@@ -82,7 +82,7 @@ def bounds(paths: Paths) -> Bounds:
 
 def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
     """`Bounds` of some paths. Rows and columns of the covariance: position, direction, optical path."""
-    from fringetrace.bounces import legs
+    from fringetrace.contacts import legs
 
     normal, bend = _tables(paths)
     length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
@@ -115,7 +115,7 @@ def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 def _tables(paths: Paths) -> tuple[FloatArray, FloatArray]:
     """Normal (m, b, 3) and curvature (m, b, 3, 3) at each bounce; at least one column."""
-    from fringetrace.bounces import curvature, met, normals
+    from fringetrace.contacts import curvature, met, normals
 
     depth = max(1, int(paths.bounces.max(initial=0)))
     normal, bend = np.zeros((len(paths), depth, 3)), np.zeros((len(paths), depth, 3, 3))

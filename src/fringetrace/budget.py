@@ -172,7 +172,7 @@ def _rms(values: Array, weight: Array) -> float:
 
 
 def hit_error(paths: Paths, wavelength: float) -> float:
-    """Rounding of the optical paths; see `bounces.rounding`.
+    """Rounding of the optical paths; see `contacts.rounding`.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def hit_error(paths: Paths, wavelength: float) -> float:
     -------
     float, waves, rms over the power
     """
-    from fringetrace.bounces import rounding
+    from fringetrace.contacts import rounding
 
     return _rms(rounding(paths) / wavelength, np.abs(paths.amplitude) ** 2)
 
@@ -209,7 +209,7 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
     (name, float) or None
         The surface that costs most, and the largest error of a path by it, in waves.
     """
-    from fringetrace.bounces import flattened, legs, met, shifted
+    from fringetrace.contacts import flattened, legs, met, shifted
 
     length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
     onward = np.cumsum(length[:, ::-1], axis=1)[:, ::-1]

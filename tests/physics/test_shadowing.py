@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace.bounces import rounding
+from fringetrace.contacts import rounding
 
 SCRIPT = Path(__file__).parents[2] / "benchmarks" / "shadowing.py"
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import bounces, forms, mm, nm, shapes
+from fringetrace import contacts, forms, mm, nm, shapes
 from fringetrace.vectors import rotation, unit
 
 EPS = float(np.finfo(np.float64).eps)
@@ -25,13 +25,13 @@ SPHERE = forms.Sphere((0.3, -0.2, 0.5), 0.1)
 
 def test_paths_have_to_be_recorded():
     paths = ball(None)
-    with pytest.raises(ValueError, match="bounces: expected paths traced with record=True"):
-        list(bounces.met(replace(paths, points=None)))
+    with pytest.raises(ValueError, match="contacts: expected paths traced with record=True"):
+        list(contacts.met(replace(paths, points=None)))
 
 
 def test_segments_are_those_of_the_path():
     paths = ball(SPHERE)
-    length, direction = bounces.legs(paths)
+    length, direction = contacts.legs(paths)
     assert length.shape == (len(paths), 2)
     np.testing.assert_allclose(length.sum(axis=1).astype(float), paths.length, rtol=4 * EPS)
     np.testing.assert_allclose(direction[:, 1].astype(float), paths.direction, rtol=0, atol=8 * EPS)
@@ -43,33 +43,33 @@ def test_segments_are_those_of_the_path():
 def test_the_plane_in_focus_may_lie_behind_the_last_surface():
     paths = ball(SPHERE)
     behind = ft.trace(paths.scene, paths.source, replace(paths.ccd, focus=0.35), record=True).detected
-    length, _ = bounces.legs(behind)
+    length, _ = contacts.legs(behind)
     assert (length[:, 1] < 0.0).all()
     np.testing.assert_allclose(length.sum(axis=1).astype(float), behind.length, rtol=4 * EPS)
 
 
 def test_hits_are_off_their_facets_by_roundings():
     for form in (None, SPHERE):
-        (met,) = bounces.met(ball(form))
+        (met,) = contacts.met(ball(form))
         assert met.formed.all() == (form is not None)
-        offset = np.linalg.norm(bounces.off(met).astype(float), axis=1)
+        offset = np.linalg.norm(contacts.off(met).astype(float), axis=1)
         assert 0.0 < offset.max() < 4 * EPS
 
 
 def test_a_hit_that_is_off_is_seen():
     paths = ball(None)
-    (met,) = bounces.met(paths)
-    normal = bounces.normals(met)
+    (met,) = contacts.met(paths)
+    normal = contacts.normals(met)
     lifted = replace(met, point=met.point + 5 * nm * normal)
-    np.testing.assert_allclose(bounces.off(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS)
+    np.testing.assert_allclose(contacts.off(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS)
 
 
 def test_a_mirror_moved_along_its_normal_changes_the_path_by_twice_the_cosine():
     paths = ball(SPHERE)
-    (met,) = bounces.met(paths)
-    normal = bounces.normals(met)
-    _, direction = bounces.legs(paths)
-    change = bounces.shifted(paths, met, 1 * nm * normal, direction)
+    (met,) = contacts.met(paths)
+    normal = contacts.normals(met)
+    _, direction = contacts.legs(paths)
+    change = contacts.shifted(paths, met, 1 * nm * normal, direction)
     cosine = np.abs(normal[:, 2])
     # a hit in front of the mirror has a path that is too short
     np.testing.assert_allclose(change.astype(float), -2 * nm * cosine, rtol=1e-12)
@@ -92,8 +92,8 @@ def test_curvature_is_that_of_the_form(name):
     scene = ft.Scene([ft.Surface(mesh, ft.Mirror(), form=form)])
     rays = ft.Rays([(0.3, -0.2, 1.0), (0.32, -0.21, 1.0)], [(0, 0, -1.0)] * 2)
     paths = ft.trace(scene, rays, max_bounces=1, record=True)
-    (met,) = bounces.met(paths)
-    bend, normal = bounces.curvature(met), bounces.normals(met)
+    (met,) = contacts.met(paths)
+    bend, normal = contacts.curvature(met), contacts.normals(met)
     np.testing.assert_allclose(np.einsum("nij,nj->ni", bend, normal), 0.0, atol=1e-9)
     if name == "ellipsoid":
         normal = -normal  # heights grow inwards
@@ -102,7 +102,7 @@ def test_curvature_is_that_of_the_form(name):
     # n(p + dp) = n + C dp
     moved = replace(met, point=met.point + 1e-6 * unit(np.cross(normal, (0, 1.0, 0.2))))
     turned = (
-        bounces.normals(moved) * np.sign((bounces.normals(moved) * normal).sum(1))[:, None] - normal
+        contacts.normals(moved) * np.sign((contacts.normals(moved) * normal).sum(1))[:, None] - normal
     ) / 1e-6
     step = unit(np.cross(normal, (0, 1.0, 0.2)))
     np.testing.assert_allclose(turned, np.einsum("nij,nj->ni", bend, step), atol=1e-3)
@@ -110,8 +110,8 @@ def test_curvature_is_that_of_the_form(name):
 
 def test_patches_bend_like_the_ball_they_were_made_for():
     for form, near in ((forms.Smooth(), 0.1), (None, None)):
-        (met,) = bounces.met(ball(form, level=4))
-        bend = bounces.curvature(met) * 0.1
+        (met,) = contacts.met(ball(form, level=4))
+        bend = contacts.curvature(met) * 0.1
         values = np.sort(np.linalg.eigvalsh(bend), axis=1)
         if form is None:
             assert (bend == 0.0).all()
@@ -120,12 +120,12 @@ def test_patches_bend_like_the_ball_they_were_made_for():
 
 
 def test_facets_leave_out_what_a_form_gives():
-    (plain,) = bounces.met(ball(None))
-    height, lean = bounces.flattened(plain)
+    (plain,) = contacts.met(ball(None))
+    height, lean = contacts.flattened(plain)
     assert np.linalg.norm(height, axis=1).max() == pytest.approx(0.1 * 4.528e-3, rel=0.1)
     assert np.linalg.norm(lean, axis=1).max() > 0.05
-    (formed,) = bounces.met(ball(SPHERE))
-    assert not np.any(bounces.flattened(formed))
+    (formed,) = contacts.met(ball(SPHERE))
+    assert not np.any(contacts.flattened(formed))
 
 
 @pytest.mark.parametrize("longer", [0.0, 3 * nm])
@@ -137,5 +137,5 @@ def test_rounding_is_what_the_path_lacks(longer):
     beam = ft.Beam((0, 0, 1), (0, 0, -1), (0, 1, 0), (1 * mm, 1 * mm), (3, 3))
     for source in (rays, beam):
         paths = ft.trace(scene, source, record=True)
-        error = bounces.rounding(replace(paths, length=paths.length + longer))
+        error = contacts.rounding(replace(paths, length=paths.length + longer))
         np.testing.assert_allclose(error, longer, rtol=0, atol=16 * EPS)

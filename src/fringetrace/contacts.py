@@ -57,7 +57,7 @@ def met(paths: Paths) -> Iterator[Met]:
         If the trace did not record them.
     """
     if paths.surface is None or paths.triangle is None or paths.points is None:
-        raise ValueError("bounces: expected paths traced with record=True, got paths without points")
+        raise ValueError("contacts: expected paths traced with record=True, got paths without points")
     for number, surface in enumerate(paths.scene.surfaces):
         path, bounce = np.nonzero(paths.surface == number)
         if len(path) == 0:
