@@ -223,9 +223,9 @@ def facets_bench() -> Iterator[Row]:
         for form in (None, forms.Conic((0, 0, 0), (0, 0, -1), 1.0, -1.0)):
             sample = ft.Surface(mesh, MIRROR, "sample", form=form)
             bench = instruments.michelson(sample, aperture=6 * mm, pixels=(64, 64))
-            field.append(bench.field(HENE))
+            field.append(ft.complex_field(bench.trace(), HENE, "rays"))
             if form is None:
-                estimate = budget(bench.trace(), HENE).facets
+                estimate = budget(bench.trace(), HENE, "rays").facets
         yield Row(f"{cells - 1} x {cells - 1} cells", off(*field), estimate)
 
 
@@ -362,7 +362,7 @@ def terrain() -> Iterator[Row]:
             instruments.michelson(mesh, aperture=6e-3, pixels=(pixels, pixels), rays=n).trace()
             for n in (8, 1)
         )
-        costs = budget(coarse, HENE)
+        costs = budget(coarse, HENE, "rays")
         truth = off(ft.complex_field(coarse, HENE, "rays"), ft.complex_field(fine, HENE, "rays"))
         yield Row(f"{pixels} x {pixels} pixels", truth, math.hypot(costs.sampling, costs.pixels))
 

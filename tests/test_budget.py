@@ -21,7 +21,8 @@ def bench():
 
 
 def test_a_flat_bench_costs_roundings_only():
-    costs = instruments.michelson(shapes.plate(8 * mm, 8 * mm), aperture=6 * mm, pixels=(24, 32)).budget(HENE)
+    flat = instruments.michelson(shapes.plate(8 * mm, 8 * mm), aperture=6 * mm, pixels=(24, 32))
+    costs = ft.budget(flat.trace(), HENE, "rays")
     assert 0.0 < costs.hit < 1e-9
     assert costs.facets <= costs.hit
     assert max(costs.sampling, costs.pixels) < 1e-9  # a ray a pixel, on its middle; no tilt
@@ -33,11 +34,12 @@ def test_pixels_across_an_edge_cost_sampling(bench):
     # one ray takes either side of the edge for all of its pixel: 1 of 32 columns, by half of it at the rms
     rise = abs(1.0 - np.exp(4j * math.pi * 100 * nm / HENE)) / 2
     edge = math.sqrt(1 / 32) * 0.5 * rise / 2 / math.pi
-    assert 0.5 * edge < bench.budget(HENE).sampling < 10.0 * edge
+    assert 0.5 * edge < ft.budget(bench.trace(), HENE, "rays").sampling < 10.0 * edge
 
 
 def test_it_is_that_of_its_paths(bench):
-    assert ft.budget(bench.trace(), HENE) == bench.budget(HENE)
+    costs = bench.budget(HENE)
+    assert ft.budget(bench.trace(), HENE, costs.method) == costs
 
 
 def test_tilt_costs_pixels():
@@ -46,7 +48,7 @@ def test_tilt_costs_pixels():
     bench = instruments.michelson(plain, aperture=6 * mm, pixels=(64, 64), reference_tilt=(5e-4, 0.0))
     cycles = math.sin(1e-3) * bench.ccd.pitch / HENE
     arms = (1.0 - np.sinc(cycles)) / 2 / (2 * math.pi) / math.sqrt(0.5)
-    assert bench.budget(HENE).pixels == pytest.approx(arms, rel=0.05)
+    assert ft.budget(bench.trace(), HENE, "rays").pixels == pytest.approx(arms, rel=0.05)
 
 
 def test_by_the_wavefront_method(bench):
