@@ -110,7 +110,7 @@ def test_what_has_no_budget(bench):
         ft.budget(ft.trace(bench.scene, bench.beam), HENE)
     with pytest.raises(ValueError, match="budget: expected paths of a Beam, got those of Rays"):
         ft.budget(ft.trace(bench.scene, rays, bench.ccd), HENE)
-    with pytest.raises(ValueError, match="method: expected 'rays' or 'wavefront', got 'guess'"):
+    with pytest.raises(ValueError, match="method: expected 'auto', 'wavefront' or 'rays', got 'guess'"):
         ft.budget(paths, HENE, method="guess")
     with pytest.raises(ValueError, match="wavelength: expected a positive length"):
         ft.budget(paths, -HENE)
