@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import fits, forms, mm, outlines, probes, rims, shapes
+from fringetrace import fits, forms, mm, outlines, probes, rims, shapes, squares, survey
 
 HENE = 632.8e-9
 # An edge is known to 1e-4 of a pixel over its length.
-EDGE = outlines.PIXEL
+EDGE = squares.PIXEL
 
 
 def shadow(count=12, pixels=60):
@@ -29,15 +29,15 @@ def shadow(count=12, pixels=60):
 
 
 def cut(paths):
-    survey = probes.survey(paths)
-    lit = survey.corners(0)
-    row, column = np.nonzero(outlines.widened(lit.any(axis=-1)))
+    seen = survey.survey(paths)
+    lit = seen.corners(0)
+    row, column = np.nonzero(survey.widened(lit.any(axis=-1)))
     low = np.stack([column, row], axis=1).astype(float)
     scale = np.full(len(row), 60 / 12)
-    squares = outlines.Squares(
+    cells = squares.Squares(
         np.zeros(len(row), dtype=int), row * lit.shape[1] + column, scale, low, lit[row, column], 1.0
     )
-    return survey, outlines.cut(survey.probe, survey.names, squares)
+    return seen, outlines.cut(seen.probe, seen.names, cells)
 
 
 def test_a_round_shadow_leaves_the_rest_of_the_beam():
@@ -52,25 +52,25 @@ def test_a_round_shadow_leaves_the_rest_of_the_beam():
 
 
 def test_chords_are_lit_to_their_left():
-    survey, pieces = cut(shadow())
+    seen, pieces = cut(shadow())
     begin, end = np.moveaxis(pieces.chord[pieces.cut], 1, 0)
     along = end - begin
     left = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
-    middle, names = 0.5 * (begin + end), np.repeat(survey.names, len(begin))
-    assert survey.probe.lit(middle + 1e-3 * left, names).all()
-    assert not survey.probe.lit(middle - 1e-3 * left, names).any()
+    middle, names = 0.5 * (begin + end), np.repeat(seen.names, len(begin))
+    assert seen.probe.lit(middle + 1e-3 * left, names).all()
+    assert not seen.probe.lit(middle - 1e-3 * left, names).any()
 
 
 def test_fits_are_made_of_light_only():
     """Every ray of a fit starts where the pieces are lit, and spreads over all of it."""
-    survey, pieces = cut(shadow())
+    seen, pieces = cut(shadow())
     part = pieces.part(~pieces.whole)
     cells, owner = np.unique(part.cell, return_inverse=True)
     at, low, high = fits.places(part, owner, len(cells))
     there = (high - low > 1e-6).all(axis=1)  # an edge through a node leaves pieces of no size
     assert there.sum() > 25
     at, low, high = at[there], low[there], high[there]
-    assert survey.probe.lit(at.reshape(-1, 2), np.repeat(survey.names, at.size // 2)).mean() > 0.999
+    assert seen.probe.lit(at.reshape(-1, 2), np.repeat(seen.names, at.size // 2)).mean() > 0.999
     assert ((at >= low[:, None]) & (at <= high[:, None])).all()
     assert (np.ptp(at, axis=1) / (high - low)).mean() > 0.9
 
@@ -125,6 +125,6 @@ def test_a_profile_is_that_of_the_beam():
 def test_without_curved_sheets_there_are_none():
     plain = ft.Scene([ft.Surface(shapes.plate(4 * mm, 4 * mm), ft.Mirror())])
     paths = shadow(4, 8)
-    found, segments = rims.curved(probes.survey(ft.trace(plain, paths.source, paths.ccd)))
+    found, segments = rims.curved(survey.survey(ft.trace(plain, paths.source, paths.ccd)))
     assert found == []
     assert len(segments) == 0

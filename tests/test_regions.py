@@ -9,7 +9,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 import fringetrace as ft
-from fringetrace import instruments, mm, nm, outlines, probes, regions, shapes
+from fringetrace import instruments, mm, nm, outlines, probes, regions, shapes, survey
 from fringetrace.rays import launch, launch_at
 from fringetrace.vectors import rotation
 
@@ -80,7 +80,7 @@ def test_a_mirror_off_the_camera_brings_nothing():
 
 def test_a_corner_inside_a_cell_is_found_by_quartering():
     mesh = shapes.plate(1.07 * mm, 1.07 * mm).moved((0.4 * mm, 0.4 * mm, 0))
-    ((wave, region),) = regions.waves(probes.survey(lit(mesh, (5, 5))))
+    ((wave, region),) = regions.waves(survey.survey(lit(mesh, (5, 5))))
     assert abs(wave.amplitude) == pytest.approx(1.0, rel=ROUNDING)
     assert (region.pieces[:, 2] - region.pieces[:, 0]).min() == 0.5**outlines.DEPTH
     # each quartering of the four corners leaves a few pieces, not all of the edge
@@ -89,7 +89,7 @@ def test_a_corner_inside_a_cell_is_found_by_quartering():
 
 def test_a_straight_edge_costs_one_piece_a_cell():
     step = shapes.step(9 * mm, 9 * mm, 0.1 * mm, 80 * nm).moved(turn=rotation((0, 0, 1), 0.4))
-    found = list(regions.waves(probes.survey(lit(step))))
+    found = list(regions.waves(survey.survey(lit(step))))
     assert len(found) == 2
     for _, region in found:
         assert (region.pieces[:, 2:4] - region.pieces[:, :2] == 1.0).all()

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.probes import Probe
+from fringetrace.squares import COARSE, CORNERS, PIXEL, STRAIGHT, Pieces, Squares, allowed, denied, quarters
+from fringetrace.survey import Witnesses
 from fringetrace.waves import Array, FloatArray
 
 # Where an edge crosses a side is found to this part of a cell,
@@ -16,103 +16,18 @@ FINE = 2.5e-10
 FINER = 0.05
 # Rays sent at a time in search of edges, and along a line: a trace of fewer takes as long.
 RAYS, MOST = 1024, 63
-# An edge may be off by this many pixels over a pixel's length: the area of a pixel that it mistakes.
-PIXEL = 1e-4
-# Known in cells: no better than this part of one, which single rays tell, no worse than that.
-STRAIGHT, COARSE = 1e-7, 1e-2
 # A chord shorter than this part of its cell is not looked at.
 SHORT = 1e-4
 # Where several edges meet, cells are quartered this often; what is left is 1e-6 of a cell's area.
 DEPTH = 10
+# Where something hides between corners, down to this part of a cell.
+HIDDEN = 0.5**8
 # A bent edge is halved this often.
 BENDS = 9
 # Chords of a bent edge are no steeper than this to its first one's axis: else it turns a corner.
 STEEP = 4.0
 # Where along a chord it is looked at.
 ALONG = (0.21, 0.5, 0.83)
-CORNERS = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
-
-
-@dataclass(frozen=True, eq=False)
-class Pieces:
-    """Parts of cells of the beam's grid: rectangles, lit to the left of a chord.
-
-    Attributes
-    ----------
-    wave, cell : (n,) int64
-        Numbers of the sequence of surfaces and of the cell, row * columns + column.
-    low, high : (n, 2) float64
-        Corners of the rectangle, in cells (column, row).
-    chord : (n, 2, 2) float64
-        Its ends; NaN where all of the rectangle is lit.
-    """
-
-    wave: npt.NDArray[np.int64]
-    cell: npt.NDArray[np.int64]
-    low: FloatArray
-    high: FloatArray
-    chord: FloatArray
-
-    @property
-    def cut(self) -> npt.NDArray[np.bool_]:
-        """Which have a chord."""
-        return np.isfinite(self.chord[:, 0, 0])
-
-    @property
-    def whole(self) -> npt.NDArray[np.bool_]:
-        """Which are all of their cell."""
-        return np.asarray(~self.cut & (self.high - self.low == 1.0).all(axis=1))
-
-    @property
-    def lines(self) -> FloatArray:
-        """(n, 3) a, b, c: lit where a s + b t >= c."""
-        begin, end = self.chord[:, 0], self.chord[:, 1]
-        a, b = begin[:, 1] - end[:, 1], end[:, 0] - begin[:, 0]
-        line = np.stack([a, b, a * begin[:, 0] + b * begin[:, 1]], axis=1)
-        return np.where(self.cut[:, None], line, (0.0, 0.0, -1.0))
-
-    def part(self, rows: Array) -> Pieces:
-        """Some of them."""
-        return Pieces(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-    @staticmethod
-    def joined(parts: list[Pieces]) -> Pieces:
-        """One table of several, at least one."""
-        columns = ([getattr(part, field.name) for part in parts] for field in fields(Pieces))
-        return Pieces(*(np.concatenate(column) for column in columns))
-
-
-@dataclass(frozen=True, eq=False)
-class Squares:
-    """Cells, or parts of them, that are all of a size: `lit` (n, 4) at the corners, from (0, 0) around.
-
-    `scale` (n,) is how many pixels a cell is wide.
-    """
-
-    wave: npt.NDArray[np.int64]
-    cell: npt.NDArray[np.int64]
-    scale: FloatArray
-    low: FloatArray
-    lit: npt.NDArray[np.bool_]
-    size: float
-
-    def part(self, rows: Array) -> Squares:
-        """Some of them."""
-        return Squares(
-            self.wave[rows], self.cell[rows], self.scale[rows], self.low[rows], self.lit[rows], self.size
-        )
-
-    @staticmethod
-    def joined(parts: list[Squares]) -> Squares:
-        """One table of several of a size, at least one."""
-        return Squares(
-            wave=np.concatenate([part.wave for part in parts]),
-            cell=np.concatenate([part.cell for part in parts]),
-            scale=np.concatenate([part.scale for part in parts]),
-            low=np.concatenate([part.low for part in parts]),
-            lit=np.concatenate([part.lit for part in parts]),
-            size=parts[0].size,
-        )
 
 
 def _ends(probe: Probe, bright: FloatArray, dark: FloatArray, names: Array, goal: float) -> FloatArray:
@@ -162,10 +77,8 @@ def _straight(
     along = chord[:, 1] - chord[:, 0]
     length = np.linalg.norm(along, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):
-        off = PIXEL / scale / np.minimum(length * scale, 1.0)
-        off = np.clip(off, STRAIGHT * size, np.maximum(COARSE * length, STRAIGHT * size))
         left = np.stack([-along[:, 1], along[:, 0]], axis=1) / length[:, None]
-        left *= (off + np.abs(left) @ probe.fuzz)[:, None]
+        left *= (allowed(length, scale, size) + np.abs(left) @ probe.fuzz)[:, None]
     straight = np.ones(len(chord), dtype=np.bool_)
     look = np.flatnonzero(length > SHORT * size)
     point = chord[look, None, 0] + np.array(ALONG)[:, None] * along[look, None]
@@ -265,45 +178,7 @@ def _strips(squares: Squares, axis: Array, owner: Array, chord: FloatArray, leve
     return Pieces.joined(parts)
 
 
-def _beside(squares: Squares, chosen: Array) -> npt.NDArray[np.bool_]:
-    """Squares of a wave that touch a chosen one."""
-    column, row = np.rint(squares.low / squares.size).astype(np.int64).T
-    stride, tall = column.max(initial=0) + 3, row.max(initial=0) + 3
-    number = (squares.wave * tall + row + 1) * stride + column + 1
-    steps = np.array([i * stride + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
-    return np.isin(number, (number[chosen][:, None] + steps).ravel())
-
-
-def quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
-    """Four quarters of squares, with which of their corners are lit.
-
-    Parameters
-    ----------
-    probe : Probe
-    names : (waves,) uint64
-    squares : Squares
-
-    Returns
-    -------
-    Squares
-    """
-    low, size = squares.low, squares.size
-    nodes = np.zeros((len(low), 3, 3), dtype=np.bool_)  # [row, column]
-    nodes[:, 0, 0], nodes[:, 0, 2], nodes[:, 2, 2], nodes[:, 2, 0] = squares.lit.T
-    new = np.array([(1, 0), (0, 1), (1, 1), (2, 1), (1, 2)])  # column, row
-    at = (low[:, None] + 0.5 * size * new).reshape(-1, 2)
-    lit = probe.lit(at, np.repeat(names[squares.wave], len(new)))
-    nodes[:, new[:, 1], new[:, 0]] = lit.reshape(-1, len(new))
-    corner = [np.stack([nodes[:, j, i], nodes[:, j, i + 1], nodes[:, j + 1, i + 1], nodes[:, j + 1, i]], 1)
-              for j in (0, 1) for i in (0, 1)]  # fmt: skip
-    place = [low + 0.5 * size * np.array((i, j)) for j in (0, 1) for i in (0, 1)]
-    return Squares(
-        wave=np.tile(squares.wave, 4), cell=np.tile(squares.cell, 4), scale=np.tile(squares.scale, 4),
-        low=np.concatenate(place), lit=np.concatenate(corner), size=0.5 * size,
-    )  # fmt: skip
-
-
-def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
+def cut(probe: Probe, names: Array, squares: Squares, witnesses: Witnesses | None = None) -> Pieces:
     """Cells cut along the edges between lit and dark corners; quartered where one edge will not do.
 
     Parameters
@@ -312,37 +187,33 @@ def cut(probe: Probe, names: Array, squares: Squares) -> Pieces:
     names : (waves,) uint64
         Of the sequences that `squares.wave` counts.
     squares : Squares
+    witnesses : Witnesses, optional
+        Of these sequences, for what hides between the corners.
 
     Returns
     -------
     Pieces
         Of what is lit, in no order.
     """
-    done = []
+    done: list[Pieces] = []
     finest = 0.5**DEPTH
     while True:
         last = squares.size <= finest
         crossed = (squares.lit != np.roll(squares.lit, -1, axis=1)).sum(axis=1)
         once = np.flatnonzero(crossed == 2)
         some = squares.part(once)
-        pieces, failed = _bent(probe, some, names[some.wave], last)
-        done.append(pieces)
+        bent, failed = _bent(probe, some, names[some.wave], last)
+        full = squares.part(np.flatnonzero((crossed == 0) & squares.lit[:, 0]))
+        pieces = Pieces.joined([bent, full.whole])
+        if last:
+            return Pieces.joined([*done, pieces])
         rest = crossed == 4
         rest[once[failed]] = True
+        if witnesses is not None and len(rest) and squares.size > HIDDEN:
+            rest |= denied(probe, names, squares, pieces, witnesses)
         # a corner may poke into a cell next to one with all its own corners dark, or lit
-        rest |= (crossed == 0) & _beside(squares, rest)
-        full = squares.part(np.flatnonzero((crossed == 0) & squares.lit[:, 0] & (~rest | last)))
-        blank = np.full((len(full.low), 2, 2), np.nan)
-        done.append(Pieces(full.wave, full.cell, full.low, full.low + squares.size, blank))
-        if last or not rest.any():
-            break
+        rest |= (crossed == 0) & squares.beside(rest)
+        done.append(pieces.part(~np.isin(pieces.numbers(squares.size), squares.numbers[rest])))
+        if not rest.any():
+            return Pieces.joined(done)
         squares = quarters(probe, names, squares.part(rest))
-    return Pieces.joined(done)
-
-
-def widened(mask: Array) -> npt.NDArray[np.bool_]:
-    """A mask (rows, columns) and all its neighbours."""
-    rows, columns = mask.shape
-    wide = np.pad(mask, 1)
-    window = range(3)
-    return np.asarray(np.any([wide[i : i + rows, j : j + columns] for i in window for j in window], axis=0))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fringetrace.paths import Paths
 from fringetrace.rays import launch_at
 from fringetrace.scene import CCD, Beam, Scene, Surface
-from fringetrace.sheets import checked, landed
+from fringetrace.sheets import landed
 from fringetrace.trace import trace
 from fringetrace.triangles import weld
 from fringetrace.waves import Array, FloatArray
@@ -181,77 +181,3 @@ def _hanging_together(vertices: FloatArray, faces: Array) -> npt.NDArray[np.int6
         if (lower == label).all():
             return np.asarray(least, dtype=np.int64)
         label = lower
-
-
-@dataclass(frozen=True, eq=False)
-class Survey:
-    """Paths from the nodes of a beam's grid, sorted by name.
-
-    Attributes
-    ----------
-    probe : Probe
-    paths : Paths
-        `ray` is the number of the node, row * (columns + 1) + column.
-    names : (k,) uint64
-        Sequences found.
-    curved : (k,) bool
-        Those of them that met a form.
-    rows : list of (n,) int64
-        The paths of each.
-    """
-
-    probe: Probe
-    paths: Paths
-    names: npt.NDArray[np.uint64]
-    curved: npt.NDArray[np.bool_]
-    rows: list[npt.NDArray[np.int64]]
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Rows and columns of nodes."""
-        tall, wide = self.probe.beam.shape
-        return tall + 1, wide + 1
-
-    @property
-    def keys(self) -> npt.NDArray[np.uint64]:
-        """Path keys (k,) of the sequences."""
-        return self.paths.key[[rows[0] for rows in self.rows]]
-
-    def corners(self, index: int) -> npt.NDArray[np.bool_]:
-        """Which corners of the grid's cells a sequence is lit at, (rows, columns, 4), from (0, 0) around."""
-        lit = np.zeros(self.shape, dtype=np.bool_)
-        lit.ravel()[self.paths.ray[self.rows[index]]] = True
-        return np.stack([lit[:-1, :-1], lit[:-1, 1:], lit[1:, 1:], lit[1:, :-1]], axis=-1)
-
-
-def survey(paths: Paths, half_wave_loss: bool = True) -> Survey:
-    """Trace anew from the nodes of a beam's grid. What no node lights is not seen.
-
-    Parameters
-    ----------
-    paths : Paths
-        Of a `Beam` onto a CCD; sequences of surfaces that are missing here are left out.
-    half_wave_loss : bool
-        False leaves out the factor -1 of each reflection off a mirror.
-
-    Returns
-    -------
-    Survey
-
-    Raises
-    ------
-    ValueError
-        If the source is no beam, or there is no CCD.
-    """
-    ccd, beam = checked(paths)
-    rows, _, _ = landed(paths, ccd)
-    keys, bounces = np.unique(paths.key[rows]), int(paths.bounces[rows].max(initial=0))
-    faintest = 0.5 * float(np.abs(paths.amplitude[rows]).min(initial=1.0))
-    probe = Probe(paths.scene, beam, ccd, parted(paths.scene), keys, bounces, faintest, half_wave_loss)
-    tall, wide = beam.shape[0] + 1, beam.shape[1] + 1
-    nodes = np.stack([np.tile(np.arange(wide), tall), np.repeat(np.arange(tall), wide)], 1).astype(np.float64)
-    traced, rows, found, curved = probe.paths(nodes)
-    names, first = np.unique(found, return_index=True)
-    order = np.argsort(found, kind="stable")
-    groups = np.split(rows[order], np.searchsorted(found[order], names)[1:]) if len(names) else []
-    return Survey(probe, traced, names, curved[first], groups)

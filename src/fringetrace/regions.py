@@ -8,12 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.outlines import CORNERS, Pieces, Squares, cut, widened
+from fringetrace.outlines import cut
 from fringetrace.paths import Paths
-from fringetrace.probes import RIM, Survey, profile
+from fringetrace.probes import RIM, profile
 from fringetrace.quadrature import Samples
 from fringetrace.scene import CCD, Beam
 from fringetrace.sheets import landed
+from fringetrace.squares import CORNERS, Pieces, Squares
+from fringetrace.survey import Survey
 from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
@@ -121,7 +123,7 @@ def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
     Parameters
     ----------
     survey : Survey
-        Of a beam's paths. Facets that no node of the grid lights are not seen.
+        Of a beam's paths.
 
     Yields
     ------
@@ -131,19 +133,19 @@ def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
     ccd, beam = probe.ccd, probe.beam
     found: list[Wave] = []
     squares = []
+    which = []
     for index in np.flatnonzero(~survey.curved).tolist():
-        row = int(survey.rows[index][0])
-        node = int(survey.paths.ray[row])
-        start = np.array([node % survey.shape[1], node // survey.shape[1]], dtype=np.float64)
-        start = np.clip(start, RIM, np.array(beam.shape[::-1]) - RIM)
+        row = int(survey.first[index])
+        start = np.clip(survey.at[survey.paths.ray[row]], RIM, np.array(beam.shape[::-1]) - RIM)
         wave = _wave(survey.paths, row, survey.names[index], start, beam, ccd)
         if wave.amplitude != 0:
             squares.append(_squares(survey, index, wave, len(found)))
             found.append(wave)
+            which.append(index)
     if not found:
         return
     names = np.array([wave.name for wave in found], dtype=np.uint64)
-    pieces = cut(probe, names, Squares.joined(squares))
+    pieces = cut(probe, names, Squares.joined(squares), survey.witnesses.numbered(which))
     order = np.lexsort((pieces.cell, pieces.wave))
     cuts = np.searchsorted(pieces.wave[order], np.arange(len(found) + 1))
     for n, wave in enumerate(found):
@@ -155,7 +157,7 @@ def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
 def _squares(survey: Survey, index: int, wave: Wave, number: int) -> Squares:
     """Cells that a wave may light, towards the CCD."""
     lit = survey.corners(index)
-    row, column = np.nonzero(widened(np.asarray(lit.any(axis=-1))))
+    row, column = np.nonzero(survey.cells(index))
     near = _near(wave, row, column, survey.probe.ccd)
     row, column = row[near], column[near]
     scale = np.full(len(row), np.linalg.norm(wave.matrix, 2))

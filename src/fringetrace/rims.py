@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.fits import Fit, fitted, places
-from fringetrace.outlines import PIXEL, STRAIGHT, Pieces, Squares, cut, quarters, widened
-from fringetrace.probes import Probe, Survey, profile
+from fringetrace.outlines import cut
+from fringetrace.probes import Probe, profile
 from fringetrace.scene import CCD
 from fringetrace.sheets import (
     Cells,
@@ -22,6 +22,8 @@ from fringetrace.sheets import (
     patches,
     sheet,
 )
+from fringetrace.squares import PIXEL, STRAIGHT, Pieces, Squares, quarters
+from fringetrace.survey import Survey, Witnesses
 from fringetrace.waves import Array, FloatArray
 
 # Segments that an edge within a cell is drawn with, at most.
@@ -42,7 +44,7 @@ def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
     Parameters
     ----------
     survey : Survey
-        Of a beam's paths. What no node of the grid lights is not seen.
+        Of a beam's paths.
 
     Returns
     -------
@@ -57,11 +59,12 @@ def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
     grids = [_grid(survey, index) for index in which]
     cells = Squares.joined([_squares(survey, index, grids[n], n) for n, index in enumerate(which)])
     names = survey.names[which]
-    pieces = cut(probe, names, cells)
+    witnesses = survey.witnesses.numbered(which)
+    pieces = cut(probe, names, cells, witnesses)
     pieces = pieces.part(np.lexsort((pieces.cell, pieces.wave)))
     coefficients, areas = zip(*(patches(grid) for grid in grids), strict=True)
     plain = _plain(probe, names, pieces, grids, coefficients)
-    fits = _fits(probe, names, cells, pieces.part(~plain), [grid.base for grid in grids])
+    fits = _fits(probe, names, cells, pieces.part(~plain), [grid.base for grid in grids], witnesses)
     found, drawn = [], [np.empty((0, 4))]
     for n, (grid, fit) in enumerate(zip(grids, fits, strict=True)):
         mine = pieces.part(plain & (pieces.wave == n))
@@ -100,11 +103,14 @@ def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> Squares:
     # the least step: next to where light goes past the CCD's plane there are large ones
     margin = -np.maximum(*(_around(-step) for step in steps))
     margin = np.where(np.isfinite(margin), margin, np.inf)
-    row, column = np.nonzero(widened(np.asarray(lit.any(axis=-1))))
-    near, margin = np.ones(len(row), dtype=np.bool_), margin[row, column]
+    row, column = np.nonzero(survey.cells(index))
+    # of what only rays between the nodes found, nothing is known
+    margin = margin[row, column]
+    blank = np.isinf(margin)
+    near, margin = np.ones(len(row), dtype=np.bool_), np.where(blank, 0.0, margin)
     for place, count in ((x, survey.probe.ccd.shape[1]), (y, survey.probe.ccd.shape[0])):
         least, most = -_around(-place)[row, column], _around(place)[row, column]
-        near &= (most + margin > 0.0) & (least - margin < count)
+        near &= blank | ((most + margin > 0.0) & (least - margin < count))
     row, column = row[near], column[near]
     low = np.stack([column, row], axis=1).astype(np.float64)
     cell = row * lit.shape[1] + column
@@ -152,7 +158,7 @@ def _plain(
 
 
 def _fits(
-    probe: Probe, names: Array, squares: Squares, pieces: Pieces, bases: list[float]
+    probe: Probe, names: Array, squares: Squares, pieces: Pieces, bases: list[float], witnesses: Witnesses
 ) -> list[list[Fit]]:
     """Fits of the cells of pieces, and of their quarters where need be; tables for each sheet."""
     tables: list[list[Fit]] = [[] for _ in bases]
@@ -167,7 +173,7 @@ def _fits(
             break
         squares = quarters(probe, names, squares.part(bad))
         squares = replace(squares, cell=np.arange(len(squares.cell)))
-        pieces = cut(probe, names, squares)
+        pieces = cut(probe, names, squares, witnesses)
     return tables
 
 

@@ -181,7 +181,7 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
         blank[paths.ray[rows]] = values
         return blank.reshape(*shape, *values.shape[1:])
 
-    base = float(arrived.length.mean())
+    base = float(arrived.length.mean()) if len(rows) else 0.0
     turns = np.zeros(shape, dtype=np.int64)
     if arrived.way is not None:
         way, direction, last = grid(arrived.way), grid(arrived.direction), grid(arrived.last)

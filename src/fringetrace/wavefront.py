@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace import probes, regions, rims, sheets
+from fringetrace import regions, rims, sheets
 from fringetrace.paths import Paths
 from fringetrace.quadrature import Samples, averaged, edges
 from fringetrace.regions import Region, Wave
 from fringetrace.scene import Beam
 from fringetrace.sheets import Cells
+from fringetrace.survey import survey
 from fringetrace.waves import ComplexArray, FloatArray
 
 Numbers = npt.NDArray[np.int64]
@@ -77,11 +78,11 @@ def light(paths: Paths, groups: Numbers, half_wave_loss: bool = True) -> Light:
         found = zip(landed, sheets.sheets(paths), strict=True)
         curved = [(group(key), sheets.cells(sheet, ccd)) for key, sheet in found]
         return Light(beam, unit, [], curved, np.empty((0, 4)))
-    survey = probes.survey(paths, half_wave_loss)
-    member = {name: group(key) for name, key in zip(survey.names, survey.keys, strict=True)}
-    plane = [(member[wave.name], wave, region) for wave, region in regions.waves(survey)]
-    cells, rim = rims.curved(survey)
-    named = [member[name] for name in survey.names[survey.curved]]
+    surveyed = survey(paths, half_wave_loss)
+    member = {name: group(key) for name, key in zip(surveyed.names, surveyed.keys, strict=True)}
+    plane = [(member[wave.name], wave, region) for wave, region in regions.waves(surveyed)]
+    cells, rim = rims.curved(surveyed)
+    named = [member[name] for name in surveyed.names[surveyed.curved]]
     drawn = [wave.to_pixels(region.segments).reshape(-1, 4) for _, wave, region in plane]
     return Light(beam, unit, plane, list(zip(named, cells, strict=True)), np.concatenate([rim, *drawn]))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import instruments, mm, nm, probes, regions, shapes
+from fringetrace import instruments, mm, nm, regions, shapes, survey
 from fringetrace.vectors import rotation
 
 HENE = 632.8 * nm
@@ -129,7 +129,7 @@ def test_a_staircase_is_seen_in_each_of_its_treads(treads, cells):
 
 def pieces(bench):
     """Cells that edges cut."""
-    found = regions.waves(probes.survey(bench.trace()))
+    found = regions.waves(survey.survey(bench.trace()))
     return sum((region.kind == 2).sum() for _, region in found)
 
 
