@@ -236,7 +236,10 @@ ERRORS = {
         "--wavelength: expected a number and",
     ),
     "no pixels": (["step.stl", "--unit", "mm", "--pixels", "0"], "--pixels: expected at least 1, got 0"),
-    "no rays": (["step.stl", "--unit", "mm", "--rays", "0"], "rays: expected a positive whole number, or a part of 1, got 0"),
+    "no rays": (
+        ["step.stl", "--unit", "mm", "--rays", "0"],
+        "rays: expected a positive whole number, or a part of 1, got 0",
+    ),
     "few steps": (["step.stl", "--unit", "mm", "--steps", "2"], "--steps: expected at least 3, got 2"),
     "no threads": (["step.stl", "--unit", "mm", "--threads", "0"], "threads: expected a whole number"),
     "no aperture": (
