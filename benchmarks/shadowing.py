@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from pathlib import Path
 
 import mpmath
 import numpy as np
+import pages
 
 import fringetrace as ft
 from fringetrace import forms, nm, shapes
@@ -148,18 +148,11 @@ def table() -> str:
     return "\n".join(lines)
 
 
-MARK = "<!-- by benchmarks/shadowing.py -->"
-
-
 def main() -> None:
     """Print the table; write it into its page if asked to."""
     text = table()
     if "--write" in sys.argv[1:]:
-        place = Path(__file__).parents[1] / "docs" / "budget.md"
-        before, _, after = place.read_text(encoding="utf-8").split(MARK)
-        beside = place.with_suffix(".part")
-        beside.write_text(f"{before}{MARK}\n{text}\n{MARK}{after}", encoding="utf-8")
-        beside.replace(place)
+        pages.write("shadowing", text, pages.BUDGET)
 
 
 if __name__ == "__main__":

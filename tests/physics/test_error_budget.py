@@ -1,23 +1,8 @@
 """Each term of the error budget against the true error: never below by a factor 2, nor above by 10."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
+import budget as cases
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "budget.py"
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("budget_cases", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["budget_cases"] = module  # where its dataclasses look for themselves
-    spec.loader.exec_module(module)
-    return module
-
-
-cases = loaded()
 SLOW = {"between plates", "relief of the demo, 1 ray a pixel"} | {
     name for name in cases.CASES if name.startswith("spherical wave")
 }

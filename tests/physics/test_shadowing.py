@@ -4,30 +4,16 @@ Where a ray of float64 leaves after many bounces, a true ray leaves too, whose s
 rounding away; their optical paths are the same.
 """
 
-import importlib.util
 import math
-import sys
-from pathlib import Path
 
 import mpmath
 import numpy as np
 import pytest
+import shadowing
 
 import fringetrace as ft
 from fringetrace.contacts import rounding
 
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "shadowing.py"
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("shadowing", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["shadowing"] = module  # where its dataclasses look for themselves
-    spec.loader.exec_module(module)
-    return module
-
-
-shadowing = loaded()
 # Roundings of coordinates of some 100 nm, in metres: 1.3e-23 each.
 ROUNDING = 2.0**-53 * 100e-9
 # Some roundings of a path of 5 um, that to the line included, which light reaches aslant.
