@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-ACCURACY = Path(__file__).parents[1] / "docs" / "accuracy.md"
+DOCS = Path(__file__).parents[1] / "docs"
+ACCURACY, BUDGET = DOCS / "accuracy.md", DOCS / "budget.md"
 
 
 def write(name: str, text: str, page: Path = ACCURACY) -> None:

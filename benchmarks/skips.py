@@ -254,7 +254,7 @@ def differences(side: int) -> Skip:
     paths = ft.trace(bench.scene, replace(bench.beam, shape=(12, 12)), bench.ccd)
 
     def image() -> list[np.ndarray]:
-        return [ft.irradiance(paths, WAVE)]
+        return [ft.irradiance(paths, WAVE, "wavefront")]
 
     rooms = ("sheets", "regions", "field", "quadrature")
     carrier = without(image, "fringes", lambda real: lambda slope, _: real(slope, True), *rooms)
@@ -278,11 +278,31 @@ def imported(side: int) -> Skip:
     )  # fmt: skip
 
 
+def even(side: int) -> Skip:
+    """Where light is even, its value at the centre of a pixel and its curvature give the mean."""
+    focal, z, pixels = 50 * mm, 20 * mm, max(16, side)
+    x = np.linspace(-3 * mm, 3 * mm, 65)
+    mesh = ft.shapes.height_map((x[:, None] ** 2 + x**2) / (4 * focal), x[1] - x[0])
+    form = ft.forms.Conic((0, 0, 0), (0, 0, 1), 2 * focal, -1.0)
+    beam = ft.Beam((0, 0, 30 * mm), (0, 0, -1), (0, 1, 0), (3.6 * mm, 3.6 * mm), (24, 24))
+    ccd = ft.CCD((0, 0, z), (0, 0, -1), (0, 1, 0), 2 * mm / pixels, (pixels, pixels))
+    paths = ft.trace(ft.Scene([ft.Surface(mesh, ft.Mirror(), form=form)]), beam, ccd)
+
+    def image() -> list[np.ndarray]:
+        return [ft.irradiance(paths, WAVE)]
+
+    def never(_: Callable) -> Callable:
+        return lambda bend, values: np.zeros(values.shape[-2:], dtype=bool)
+
+    sampled = without(image, "_small", never, "quadrature")
+    return Skip("one sample a pixel where light is even", "paraboloid with form", image, sampled)
+
+
 SKIPS: dict[str, Callable[[int], Skip]] = {
     case.__name__: case
     for case in (
         only_mirrors, in_place, culled, closed, doubted, dropped, unrecorded, uniform, rephased, stepped,
-        differences, imported,
+        differences, even, imported,
     )
 }  # fmt: skip
 

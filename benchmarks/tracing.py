@@ -108,7 +108,7 @@ def interferogram(side: int) -> dict:
 
     def image(threads: int):
         chunks = ft.stream(bench.scene, bench.beam, bench.ccd, threads=threads)
-        return np.abs(ft.complex_field(chunks, 633e-9)) ** 2
+        return np.abs(ft.complex_field(chunks, 633e-9, "rays")) ** 2
 
     return compare(
         "michelson", bench.scene, paths, {"1 thread": lambda: image(1), "2 threads": lambda: image(2)}
@@ -159,7 +159,7 @@ bench = scenes.michelson(1024)
 
 def image(side):
     beam = replace(bench.beam, shape=(side, side))
-    return ft.complex_field(ft.stream(bench.scene, beam, bench.ccd), 633e-9)
+    return ft.complex_field(ft.stream(bench.scene, beam, bench.ccd), 633e-9, "rays")
 
 image(256)
 before = peak()

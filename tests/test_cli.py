@@ -90,7 +90,20 @@ def test_options_reach_the_bench(command, sample, tmp_path):
 
 def test_fringes_that_alias_are_warned_of(command, sample, tmp_path):
     options = ["--unit", "mm", "--out", tmp_path, "--tilt", "2 mrad", *QUICK]
-    assert "fringes alias" in command("interferogram", sample, *options)[1]
+    code, said, errors = command("interferogram", sample, *options)
+    assert (code, errors) == (0, "")
+    # 1.58 fringes a pixel of 250 um
+    assert "note         fringes alias" in said
+    assert "by 3.16 pi about" in said
+
+
+def test_the_error_budget_is_one_line(command, sample, tmp_path):
+    _, said, _ = command("interferogram", sample, "--unit", "mm", "--out", tmp_path, *QUICK)
+    line = next(line for line in said.splitlines() if line.startswith("budget"))
+    terms = re.findall(r"(\w+) (\d\.\de[-+]\d\d)", line)
+    assert [name for name, _ in terms] == ["hit", "facets", "sampling", "pixels", "total"]
+    assert float(dict(terms)["hit"]) < 1e-9
+    assert "note" not in said
 
 
 def test_steps_that_one_wavelength_cannot_tell_are_named(command, tmp_path):
@@ -223,7 +236,10 @@ ERRORS = {
         "--wavelength: expected a number and",
     ),
     "no pixels": (["step.stl", "--unit", "mm", "--pixels", "0"], "--pixels: expected at least 1, got 0"),
-    "no rays": (["step.stl", "--unit", "mm", "--rays", "0"], "rays: expected a positive whole number, got 0"),
+    "no rays": (
+        ["step.stl", "--unit", "mm", "--rays", "0"],
+        "rays: expected a positive whole number, or a part of 1, got 0",
+    ),
     "few steps": (["step.stl", "--unit", "mm", "--steps", "2"], "--steps: expected at least 3, got 2"),
     "no threads": (["step.stl", "--unit", "mm", "--threads", "0"], "threads: expected a whole number"),
     "no aperture": (

@@ -1,13 +1,12 @@
 """Work-precision runs: errors against known fields, how they fall, what is written. No time decides."""
 
-import importlib.util
 import json
 import math
-import sys
-from pathlib import Path
 
 import numpy as np
+import pages
 import pytest
+import skips
 from matplotlib.image import imread
 
 import fringetrace as ft
@@ -15,7 +14,6 @@ from fringetrace import precision, views
 from fringetrace.precision import METHODS, Run, irradiance_error, phase_error
 from fringetrace.standards import STANDARDS
 
-BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 BY_NAME = {method.name: method for method in METHODS}
 PIXELS, CELLS = 16, 8
 # A pixel's mean may be off so much, of the irradiance; and so many waves a field of that accuracy.
@@ -155,21 +153,8 @@ def test_a_quick_bench_runs_each_method_that_suits():
 # The scripts that write docs/accuracy.md.
 
 
-def loaded(name):
-    if str(BENCHMARKS) not in sys.path:
-        sys.path.insert(0, str(BENCHMARKS))
-    spec = importlib.util.spec_from_file_location(f"benchmark_{name}", BENCHMARKS / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # where its dataclasses look for themselves
-    spec.loader.exec_module(module)
-    return module
-
-
-skips = loaded("skips")
-
-
 def test_sections_are_written_each_on_its_own(tmp_path):
-    pages, page = loaded("pages"), tmp_path / "page.md"
+    page = tmp_path / "page.md"
     page.write_text("# Page\n\n<!-- one -->\n\nold\n\n<!-- end of one -->\n\nby hand\n")
     pages.write("one", "new\n", page)
     pages.write("two", "more", page)

@@ -9,7 +9,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from fringetrace.bounds import Bounds, bounds
+from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
+from fringetrace.guards import FringetraceWarning
 from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
@@ -27,7 +30,10 @@ __all__ = [
     "Absorber",
     "Beam",
     "BeamSplitter",
+    "Bounds",
+    "Budget",
     "Fate",
+    "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
@@ -36,6 +42,8 @@ __all__ = [
     "Rays",
     "Scene",
     "Surface",
+    "bounds",
+    "budget",
     "complex_field",
     "degree",
     "forms",

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace import phase
-from fringetrace.field import complex_field, method_for, mutual_intensity
+from fringetrace import guards, phase
+from fringetrace.budget import Budget, budget
+from fringetrace.field import chosen, complex_field, mutual_intensity
 from fringetrace.paths import Paths
 from fringetrace.quadrature import mutual_products
 from fringetrace.scene import CCD, Beam, Scene
@@ -128,7 +129,7 @@ class Bench:
 
     def _found(self, wavelength: float, what: str) -> ComplexArray:
         paths = self.trace()
-        if self._chosen(paths) == "rays":
+        if chosen(paths, self.method) == "rays":
             if what == "mutual":
                 return mutual_products(self.fields(wavelength))
             return self._summed(paths.detected, wavelength)
@@ -138,9 +139,6 @@ class Bench:
         groups = light.shape[:-2]
         missing = [(0, max(0, 2 - n)) for n in groups]
         return np.pad(light, [*missing, (0, 0), (0, 0)])
-
-    def _chosen(self, paths: Paths) -> str:
-        return method_for(paths) if self.method == "auto" else self.method
 
     def stream_fields(
         self,
@@ -208,12 +206,44 @@ class Bench:
         -------
         (rows, columns) float64
             1 where a beam of unit irradiance would fall straight on the CCD.
+
+        Warns
+        -----
+        FringetraceWarning
+            Where fringes alias, pixels starve or waves fold, see `fringetrace.guards`.
         """
+        guards.check(self.trace(), wavelength, self.method)
+        light = self._recorded(wavelength, step)
+        return np.sqrt(light) if modulus else light
+
+    def _recorded(self, wavelength: float, step: float) -> FloatArray:
+        """Irradiance with a phase step."""
         mutual = self.mutual(wavelength)
         turns = np.exp(1j * step * np.arange(len(mutual)))
         # what rounding leaves of a dark pixel may be negative
         light = np.maximum(np.einsum("m,n,mnij->ij", turns, turns.conj(), mutual).real, 0.0)
-        return np.asarray(np.sqrt(light) if modulus else light, dtype=np.float64)
+        return np.asarray(light, dtype=np.float64)
+
+    def budget(self, wavelength: float) -> Budget:
+        """What rounding, facets, rays and pixels cost the image, in waves.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+
+        Returns
+        -------
+        Budget
+
+        Warns
+        -----
+        FringetraceWarning
+            As `interferogram`, and where facets cost over 1/20 wave.
+        """
+        guards.check(self.trace(), wavelength, self.method)
+        costs = budget(self.trace(), wavelength, self.method)
+        guards.check_budget(costs)
+        return costs
 
     def phase_steps(self, wavelength: float, steps: int = 4) -> FloatArray:
         """Frames of a phase-stepped recording: frame k adds 2 pi k / steps to the reference.
@@ -236,7 +266,7 @@ class Bench:
         if steps < 3:
             raise ValueError(f"phase steps: expected at least 3, got {steps}")
         shifts = 2.0 * math.pi * np.arange(steps) / steps
-        return np.stack([self.interferogram(wavelength, step=shift) for shift in shifts])
+        return np.stack([self._recorded(wavelength, shift) for shift in shifts])
 
     def carrier(self, wavelength: float) -> FloatArray:
         """Phase of the tilted reference wave over the pixels, 0 at the centre of the image.

@@ -50,6 +50,24 @@ def launch(first, rows, columns, centre, u, v, direction, width, height, start, 
 
 
 @part
+def under_way(state, row):
+    """Where a ray of a batch starts, its direction, and its optical path up to there."""
+    return (
+        state[row, OX], state[row, OY], state[row, OZ], state[row, DX], state[row, DY], state[row, DZ],
+        state[row, WAY],
+    )  # fmt: skip
+
+
+@part
+def ahead(met, row):
+    """The point that a ray meets next, the normal there, the path to it, and its distance from the edge."""
+    return (
+        met[row, PX], met[row, PY], met[row, PZ], met[row, FX], met[row, FY], met[row, FZ], met[row, PATH],
+        met[row, RIM],
+    )  # fmt: skip
+
+
+@part
 def depart(state, row, x, y, z, dx, dy, dz, nx, ny, nz, way, edge):
     """Write a ray that leaves a face, into row `row` of a batch."""
     state[row, OX], state[row, OY], state[row, OZ] = x, y, z
@@ -126,12 +144,11 @@ def square(value):
 @part
 def onward(before, r, t, faint):
     """The branch of an amplitude that goes on from a surface: what is left, whether through it, its fate."""
-    power, r2, t2 = square(before), square(r), square(t)
-    if r2 > 0.0:
-        return before * r, False, FAINT if power * r2 < faint else ALIVE
-    if t2 > 0.0:
-        return before * t, True, FAINT if power * t2 < faint else ALIVE
-    return 0.0j, False, ABSORBED
+    through = not square(r) > 0.0
+    left = before * t if through else before * r
+    if through and not square(t) > 0.0:
+        return left, False, ABSORBED
+    return left, through, FAINT if square(left) < faint else ALIVE
 
 
 @jit
@@ -154,10 +171,9 @@ def rebound(
     many = base > np.uint64(3)  # else there is one surface, and one digit
     for row in range(count):
         guess = np.int64(prim[row])
-        gx, gy, gz = state[row, OX], state[row, OY], state[row, OZ]
-        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        gx, gy, gz, dx, dy, dz, way = under_way(state, row)
         x, y, z = (gx - cx) * scale, (gy - cy) * scale, (gz - cz) * scale
-        leaving, edge, way = state[row, LEAVING], state[row, EDGE], state[row, WAY]
+        leaving, edge = state[row, LEAVING], state[row, EDGE]
         facing, inverted, path, px, py, pz, rim = 0.0, 0.0, np.inf, x, y, z, np.inf
         if guess >= 0:
             k = np.uintp(guess)
@@ -207,17 +223,31 @@ def rebound(
 
 
 @jit
-def close_up(batch, start, born, to):
-    """Move the last `born` rows of a batch, from `start` on, up to row `to`."""
+def close_up(batch, start, born, to, faint, ends, ended):
+    """Move the last `born` rows of a batch, from `start` on, up to row `to`; the faint ones end here.
+
+    Returns how many rows of the batch and of the ends are filled.
+    """
     lost, amplitude, key, ray, bounces, reflections, serial, state, last, came = batch
-    for i in range(born):  # to <= start: in order, nothing is overwritten before it is read
-        old, new = start + i, to + i
+    end_lost, end_amplitude, end_key, end_ray, end_bounces, end_reflections, end_serial = ends[:7]
+    end_origin, end_direction, end_length, end_fate = ends[7:]
+    for old in range(start, start + born):  # to <= start: in order, nothing is overwritten before it is read
+        if square(amplitude[old]) < faint:
+            x, y, z, dx, dy, dz, way = under_way(state, old)
+            label(end_key, end_ray, end_bounces, ended, key[old], ray[old], bounces[old])
+            weigh(end_lost, end_amplitude, end_reflections, ended, 0.0, amplitude[old], reflections[old])
+            conclude(end_origin, end_direction, end_length, end_fate, ended, x, y, z, dx, dy, dz, way, FAINT)
+            end_serial[ended] = serial[old]
+            ended += 1
+            continue
         for k in range(state.shape[1]):
-            state[new, k] = state[old, k]
-        came[new, 0], came[new, 1], came[new, 2] = came[old, 0], came[old, 1], came[old, 2]
-        label(key, ray, bounces, new, key[old], ray[old], bounces[old])
-        weigh(lost, amplitude, reflections, new, lost[old], amplitude[old], reflections[old])
-        last[new], serial[new] = last[old], serial[old]
+            state[to, k] = state[old, k]
+        came[to, 0], came[to, 1], came[to, 2] = came[old, 0], came[old, 1], came[old, 2]
+        label(key, ray, bounces, to, key[old], ray[old], bounces[old])
+        weigh(lost, amplitude, reflections, to, 0.0, amplitude[old], reflections[old])
+        last[to], serial[to] = last[old], serial[old]
+        to += 1
+    return to, ended
 
 
 @jit
@@ -230,7 +260,7 @@ def interact(
     A ray that splits goes on as its reflected branch; transmitted ones follow behind all rows.
     Ends go to row `ray - first`, or, if `first` is negative, one after the other from `ended` on.
     In a `plain` scene all surfaces reflect with -1: amplitudes follow from bounces. Returns how many
-    rays go on, how many of them are new, how many have ended, and the next serial number.
+    rays go on, how many have ended, and the next serial number.
     """
     lost, amplitude, key, ray, bounces, reflections, serial, state, last, came = batch
     end_lost, end_amplitude, end_key, end_ray, end_bounces, end_reflections, end_serial = ends[:7]
@@ -239,54 +269,33 @@ def interact(
     base = np.uint64(2 * len(reflection) + 1)
     kept, born = 0, 0
     for row in range(count):
-        x, y, z = state[row, OX], state[row, OY], state[row, OZ]
-        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
-        way, here, steps, number = state[row, WAY], key[row], bounces[row], ray[row]
+        x, y, z, dx, dy, dz, way = under_way(state, row)
+        here, steps, number = key[row], bounces[row], ray[row]
         before, gone, mirrored = 1.0 + 0.0j, 0.0, steps
         if not plain:
             before, gone, mirrored = amplitude[row], lost[row], reflections[row]
-        path, k = met[row, PATH], triangle[row]
+        px, py, pz, nx, ny, nz, path, rim = ahead(met, row)
+        k = triangle[row]
         fate, reach = fated(screen, has_screen, max_bounces, steps, k >= 0, path, x, y, z, dx, dy, dz)
         if fate == ALIVE:
             surface, through = owner[np.uintp(k)], False
-            x, y, z, rim = met[row, PX], met[row, PY], met[row, PZ], met[row, RIM]
-            nx, ny, nz = met[row, FX], met[row, FY], met[row, FZ]
+            x, y, z, way, steps = px, py, pz, way + path, steps + 1
+            here = here * base + np.uint64(2 * surface + 1)
             bx, by, bz = dx, dy, dz
             if not path > 0.0:
                 bx, by, bz = came[row, 0], came[row, 1], came[row, 2]
-            way, steps, here = way + path, steps + 1, here * base + np.uint64(2 * surface + 1)
             if not plain:
                 r, t = reflection[surface], transmission[surface]
-                power, r2, t2 = square(before), square(r), square(t)
-                gone += power * (1.0 - r2 - t2)
-                if r2 > 0.0 and t2 > 0.0 and power * t2 < faint:
-                    label(end_key, end_ray, end_bounces, ended, here + np.uint64(1), number, steps)
-                    weigh(end_lost, end_amplitude, end_reflections, ended, 0.0, before * t, mirrored)
-                    conclude(
-                        end_origin,
-                        end_direction,
-                        end_length,
-                        end_fate,
-                        ended,
-                        x,
-                        y,
-                        z,
-                        dx,
-                        dy,
-                        dz,
-                        way,
-                        FAINT,
-                    )
-                    end_serial[ended] = serials
-                    ended, serials = ended + 1, serials + 1
-                elif r2 > 0.0 and t2 > 0.0:
+                r2, t2 = square(r), square(t)
+                gone += square(before) * (1.0 - r2 - t2)
+                if r2 > 0.0 and t2 > 0.0:
                     new = count + born
                     depart(state, new, x, y, z, dx, dy, dz, nx, ny, nz, way, rim)
                     came[new, 0], came[new, 1], came[new, 2] = bx, by, bz
                     label(key, ray, bounces, new, here + np.uint64(1), number, steps)
                     weigh(lost, amplitude, reflections, new, 0.0, before * t, mirrored)
-                    last[new], serial[new] = k, serials
-                    born, serials = born + 1, serials + 1
+                    last[new], serial[new] = k, serials + born
+                    born += 1
                 before, through, fate = onward(before, r, t, faint)
                 mirrored += r2 > 0.0 and t2 == 0.0
             if through:
@@ -310,8 +319,8 @@ def interact(
         if not plain:
             weigh(end_lost, end_amplitude, end_reflections, end, gone, before, mirrored)
         ended += 1
-    close_up(batch, count, born, kept)
-    return kept + born, born, ended, serials
+    kept, ended = close_up(batch, count, born, kept, faint, ends, ended)
+    return kept, ended, serials + born
 
 
 @jit

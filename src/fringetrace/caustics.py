@@ -1,4 +1,4 @@
-"""Folds on the grid of a beam: their feet, the two branches beside them, and these continued beyond; compiled.
+"""Folds on the grid of a beam: their feet, the two branches beside them, and these continued; compiled.
 
 The map from the grid (p along its columns, q along its rows) to the CCD is that of the cells of a
 sheet, see `raster`; `index` has the cell on each square of the grid, -1 where there is none.
@@ -86,9 +86,15 @@ def foot(cells, index, p, q, x, y):
         area = xs * yt - xt * ys
         area_s = xss * yt + xs * yst - xst * ys - xt * yss
         area_t = xst * yt + xs * ytt - xtt * ys - xt * yst
-        along_s, along_t = (xs, ys) if xs * xs + ys * ys > xt * xt + yt * yt else (xt, yt)
-        off = (x - px) * along_s + (y - py) * along_t
-        off_s, off_t = xs * along_s + ys * along_t, xt * along_s + yt * along_t
+        dx, dy = x - px, y - py
+        if xs * xs + ys * ys > xt * xt + yt * yt:
+            off = dx * xs + dy * ys
+            off_s = xs * xs + ys * ys - dx * xss - dy * yss
+            off_t = xs * xt + ys * yt - dx * xst - dy * yst
+        else:
+            off = dx * xt + dy * yt
+            off_s = xs * xt + ys * yt - dx * xst - dy * yst
+            off_t = xt * xt + yt * yt - dx * xtt - dy * ytt
         bulk = area_s * off_t - area_t * off_s
         if bulk == 0.0:
             return False, p, q
@@ -142,7 +148,7 @@ def wave(cells, index, p, q):
 
 @jit
 def pair(cells, index, turns, wavenumber, p, q, across_p, across_q, bend, height, x, y):
-    """Branches that a fold at (p, q) parts, at (x, y), `height` beyond: found, both roots, z, W, A, B, turns."""
+    """Branches that a fold at (p, q) parts, at (x, y), `height` beyond: found, roots, z, W, A, B, turns."""
     half = np.sqrt(2.0 * height / bend)
     up, p1, q1 = follow(cells, index, p, q, half * across_p, half * across_q, 1.0, x, y)
     down, p2, q2 = follow(cells, index, p, q, -half * across_p, -half * across_q, -1.0, x, y)

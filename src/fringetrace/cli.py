@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -198,6 +199,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             seconds = time.perf_counter() - start
         measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
+        _say_budget(console, bench, wavelength)
         measurement.write_camera(measured, folder)
         measurement.write_pictures(measured, folder)
         measurement.write_netcdf(measured, folder / "result.nc")
@@ -299,12 +301,6 @@ def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength
         f"{columns} x {rows} pixels of {_length(bench.ccd.pitch)}; "
         f"reference tilted by {bench.tilt[0] * 1e6:.4g} urad: {fringes:.3g} fringes across",
     )
-    if abs(fringes) > 0.5 * columns:
-        _say(
-            console,
-            "note",
-            "the tilt makes more than half a fringe a pixel: fringes alias; use less tilt or more pixels",
-        )
 
 
 def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: float) -> None:
@@ -341,6 +337,16 @@ def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: 
         "16 bits",
         f"65535 counts are an irradiance of {measured.full_scale:.6g} times the incident one",
     )
+
+
+def _say_budget(console: Console, bench: Bench, wavelength: float) -> None:
+    """The error budget, and what the guards warn of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", fringetrace.FringetraceWarning)
+        costs = bench.budget(wavelength)
+    _say(console, "budget", costs.line)
+    for warning in caught:
+        _say(console, "note", str(warning.message))
 
 
 def _rms(measured: Measurement, where: Array) -> str:

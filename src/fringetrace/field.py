@@ -166,17 +166,37 @@ def irradiance(
     return np.asarray(np.abs(_sum(parts, wavelength, half_wave_loss)) ** 2, dtype=np.float64)
 
 
-def _method(paths: Paths | Iterable[Paths], method: str) -> tuple[str, Iterable[Paths]]:
-    """The method, "auto" resolved, and the paths in parts, of which there is at least one."""
+def chosen(paths: Paths, method: str) -> str:
+    """A method, "auto" resolved.
+
+    Parameters
+    ----------
+    paths : Paths
+    method : {"auto", "wavefront", "rays"}
+
+    Returns
+    -------
+    {"wavefront", "rays"}
+
+    Raises
+    ------
+    ValueError
+        For any other method.
+    """
     if method not in ("auto", "wavefront", "rays"):
         raise ValueError(f"method: expected 'auto', 'wavefront' or 'rays', got {method!r}")
+    return method_for(paths) if method == "auto" else method
+
+
+def _method(paths: Paths | Iterable[Paths], method: str) -> tuple[str, Iterable[Paths]]:
+    """The method, "auto" resolved, and the paths in parts, of which there is at least one."""
     rest = iter((paths,) if isinstance(paths, Paths) else paths)
     first = next(rest, None)
     if first is None:
         raise ValueError("field: expected at least one Paths, got none")
     if first.ccd is None:
         raise ValueError("field: expected paths traced onto a CCD, got paths without one")
-    return method_for(first) if method == "auto" else method, chain([first], rest)
+    return chosen(first, method), chain([first], rest)
 
 
 def _numbers(parts: list[Paths], groups: npt.ArrayLike) -> list[npt.NDArray[np.int64]]:

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.bench import Bench, path_slope, pixel_centres
+from fringetrace.field import chosen
 from fringetrace.mesh import Mesh
 from fringetrace.meshes import interpolate_height
 from fringetrace.paths import Ledger
@@ -25,6 +26,8 @@ from fringetrace.waves import Array, FloatArray
 if TYPE_CHECKING:
     from xarray import Dataset
 
+# A bend of this many waves a pixel is a step.
+STEP = 0.02
 # What a 16-bit camera counts at full scale.
 COUNTS = 65535
 LIBRARIES = ("fringetrace", "numpy", "embreex", "numba", "scikit-image")
@@ -49,7 +52,8 @@ class Measurement:
         height - truth, less its mean (over pixels of the right fringe order): a height is measured
         up to a constant. NaN where either is unknown.
     smooth : (rows, columns) bool
-        Away from steps: the mesh changes by less than wavelength / 4 to each neighbour.
+        Away from steps: the mesh changes by less than wavelength / 4 to each neighbour, and, where
+        pixels are averaged, evenly.
     ledger : Ledger
     """
 
@@ -121,12 +125,15 @@ def heights(
     return np.asarray(interpolate_height(mesh, x[None, :] + x0, y[:, None] + y0) - z0)
 
 
-def _smooth(truth: FloatArray, limit: float) -> Array:
-    """Where heights change by less than `limit` to all neighbours; steps and rims are left out."""
+def _smooth(truth: FloatArray, limit: float, bend: float) -> Array:
+    """Where heights change by less than `limit` to all neighbours and evenly; steps and rims are left out."""
     padded = np.pad(truth, 1, mode="edge")
     middle = padded[1:-1, 1:-1]
-    around = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
-    return np.asarray(np.all([np.abs(side - middle) < limit for side in around], axis=0))
+    pairs = ((padded[:-2, 1:-1], padded[2:, 1:-1]), (padded[1:-1, :-2], padded[1:-1, 2:]))
+    with np.errstate(invalid="ignore"):
+        small = [np.abs(side - middle) < limit for pair in pairs for side in pair]
+        even = [np.abs(one + other - 2.0 * middle) < bend for one, other in pairs]
+    return np.asarray(np.all([*small, *even], axis=0))
 
 
 def _piston(differences: FloatArray, wavelength: float) -> float:
@@ -153,6 +160,9 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
     -------
     Measurement
     """
+    # a pixel that is averaged shows a mean of both sides of a step
+    averaged = chosen(bench.trace(), bench.method) == "wavefront"
+    bend = STEP * wavelength if averaged else math.inf
     frames, height = bench.phase_steps(wavelength, steps), bench.height(wavelength, steps)
     both = np.isfinite(height) & np.isfinite(truth)
     residual = np.where(both, height - truth, np.nan)
@@ -165,7 +175,7 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
         height=height,
         truth=truth,
         residual=residual - _piston(residual[both], wavelength),
-        smooth=_smooth(truth, 0.25 * wavelength),
+        smooth=_smooth(truth, 0.25 * wavelength, bend),
         ledger=bench.trace().ledger(),
     )
 

@@ -114,6 +114,10 @@ def split(cells, domain, lines, rows, columns):
     return leaves[:count]
 
 
+# A step of this part of a leaf is the last: the next would be its square.
+CLOSE = 1e-4
+
+
 @part
 def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
     """Where in a regular leaf the map meets (x, y), from (s, t) on: found, s, t and the Jacobian there."""
@@ -131,7 +135,7 @@ def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
         if stretch > 0.75:
             ds, dt = ds * 0.75 / stretch, dt * 0.75 / stretch
         s, t = s + ds, t + dt
-        if stretch < 1e-6:
+        if stretch < CLOSE:
             break
         # a regular leaf bends too little to throw a step from inside it out by half its width
         if s < s0 - 0.5 * wide or s > s1 + 0.5 * wide or t < t0 - 0.5 * tall or t > t1 + 0.5 * tall:

@@ -214,7 +214,7 @@ def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: 
         if record is not None:
             before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()}
         old = ended
-        count, _, ended, serials = interact(
+        count, ended, serials = interact(
             count, state.columns, hits.met, hits.triangle, plan.engine.owner, plan.reflection,
             plan.transmission, plan.plain, limits.packed, plan.faint, ends.columns, ended,
             first if ordered else -1, serials,

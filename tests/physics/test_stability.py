@@ -1,23 +1,7 @@
 """Stress tests of numerical stability: each figure of docs/accuracy.md, kept below its limit."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import pytest
-
-SCRIPT = Path(__file__).parents[2] / "benchmarks" / "stability.py"
-
-
-def loaded():
-    spec = importlib.util.spec_from_file_location("stability", SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["stability"] = module  # where its dataclasses look for themselves
-    spec.loader.exec_module(module)
-    return module
-
-
-stability = loaded()
+import stability
 
 
 @pytest.mark.parametrize("name", stability.CASES)

@@ -1,0 +1,254 @@
+"""Guards: warnings that name where an image is not to be trusted, by how much, and the way to mend it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.paths import Paths
+from fringetrace.scene import CCD, Beam
+from fringetrace.waves import Array, FloatArray, checked_wavelength
+
+if TYPE_CHECKING:
+    from fringetrace.budget import Budget
+
+# Facets may cost this many waves, at the rms.
+COSTLY = 1.0 / 20.0
+# So many pixels, as a part of those lit, may be without rays, or have fringes too fine for them.
+FEW = 0.01
+# Rays in a part of the image, at the least, that tell the slopes of its waves.
+ENOUGH = 4
+# Path keys that are looked at one by one: those with the most rays.
+KEYS = 8
+
+
+class FringetraceWarning(UserWarning):
+    """An image is not to be trusted: where, by how much, and what to do."""
+
+
+def check(paths: Paths, wavelength: float, method: str = "auto") -> None:
+    """Warn of aliased fringes, and for the ray sum of starved pixels and folded sheets.
+
+    Parameters
+    ----------
+    paths : Paths
+        Onto a CCD.
+    wavelength : float, metres
+    method : {"auto", "wavefront", "rays"}
+        How the field is found, see `complex_field`. The wavefront method needs no ray in each pixel, and
+        knows folds.
+    """
+    from fringetrace.field import chosen
+
+    seen = paths.detected
+    if len(seen) == 0:
+        return
+    found = [aliased(seen, wavelength)]
+    if chosen(paths, method) == "rays":
+        found += [starved(seen), folded(seen)]
+    for text in found:
+        if text is not None:
+            warnings.warn(text, FringetraceWarning, stacklevel=3)
+
+
+def check_budget(budget: Budget) -> None:
+    """Warn of costly facets.
+
+    Parameters
+    ----------
+    budget : Budget
+    """
+    text = costly(budget)
+    if text is not None:
+        warnings.warn(text, FringetraceWarning, stacklevel=3)
+
+
+def aliased(paths: Paths, wavelength: float) -> str | None:
+    """Whether fringes are too fine for the pixels: the phase between two waves steps by over pi a pixel.
+
+    Slopes are means over the rays of one path key, in parts of the image that are as small as the
+    rays allow.
+
+    Parameters
+    ----------
+    paths : Paths
+        Detected.
+    wavelength : float, metres
+
+    Returns
+    -------
+    str or None
+    """
+    ccd = _ccd(paths)
+    size = max(1, int(np.ceil(np.sqrt(ENOUGH * ccd.shape[0] * ccd.shape[1] / _rays(paths)))))
+    rows, columns = (-(-n // size) for n in ccd.shape)
+    at = np.clip(np.floor(paths.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1) // size
+    part = at[:, 0] * columns + at[:, 1]
+    kinds, which = np.unique(paths.key, return_inverse=True)
+    if len(kinds) < 2:
+        return None
+    group, member, count = np.unique(
+        part * len(kinds) + which.ravel(), return_inverse=True, return_counts=True
+    )
+    u, v, _ = ccd.axes
+    step = np.zeros(rows * columns)
+    for axis in (u, v):
+        mean = np.bincount(member.ravel(), paths.direction @ axis) / count
+        low, high = np.full(len(step), np.inf), np.full(len(step), -np.inf)
+        np.minimum.at(low, group // len(kinds), mean)
+        np.maximum.at(high, group // len(kinds), mean)
+        step = np.maximum(step, np.where(high > low, high - low, 0.0) * ccd.pitch)
+    cycles = step / checked_wavelength(wavelength)
+    bad = cycles > 0.5
+    if bad.sum() <= FEW * len(np.unique(part)):
+        return None
+    worst = int(np.argmax(cycles))
+    row, column = (n * size + size // 2 for n in divmod(worst, columns))
+    number = min(int(bad.sum()) * size**2, ccd.shape[0] * ccd.shape[1])
+    return (
+        f"fringes alias: the phase steps by more than pi a pixel at {number:,} of "
+        f"{ccd.shape[0] * ccd.shape[1]:,} pixels, by {2.0 * cycles[worst]:.3g} pi about [{row}, {column}]; "
+        f"take {np.ceil(2.0 * cycles[worst]):.0f} times as many pixels along either axis, or less tilt"
+    )
+
+
+def starved(paths: Paths) -> str | None:
+    """Whether pixels got no ray though pixels on both sides of them did.
+
+    Parameters
+    ----------
+    paths : Paths
+        Detected.
+
+    Returns
+    -------
+    str or None
+    """
+    ccd = _ccd(paths)
+    holes, lit = np.zeros(ccd.shape, dtype=np.bool_), np.zeros(ccd.shape, dtype=np.bool_)
+    for some in _commonest(paths):
+        row, column = np.clip(np.floor(some.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1).T
+        bright = np.zeros(ccd.shape, dtype=np.bool_)
+        bright[row, column] = True
+        lit |= bright
+        holes |= _between(bright) & ~bright
+    number, total = int(holes.sum()), int((lit | holes).sum())
+    if number <= FEW * total:
+        return None
+    row, column = np.argwhere(holes)[0]
+    wanted = ""
+    if isinstance(paths.source, Beam):
+        # a ray a pixel leaves holes where light spreads: two, and what is missing
+        more = np.ceil(2.0 * np.sqrt(total / max(total - number, 1)))
+        shape = (int(max(n, more * p)) for n, p in zip(paths.source.shape, ccd.shape, strict=True))
+        wanted = "a beam of {} x {} rays, or ".format(*shape)
+    return (
+        f"pixels starve: {number:,} of {total:,} lit pixels got no ray of a wave that lights both their "
+        f'sides, the first [{row}, {column}]; take {wanted}method="wavefront"'
+    )
+
+
+def folded(paths: Paths) -> str | None:
+    """Whether a wave folds over the CCD: neighbouring rays arrive in another order than elsewhere.
+
+    Where facets fold the light only cells across their edges are turned over, one cell wide: that is none.
+
+    Parameters
+    ----------
+    paths : Paths
+        Detected.
+
+    Returns
+    -------
+    str or None
+    """
+    if not isinstance(paths.source, Beam):
+        return None
+    number, total, where = 0, 0, None
+    for some in _commonest(paths):
+        turned, known, pixel = _turned(some, paths.source.shape)
+        over, back = _broad(turned & known), _broad(~turned & known)
+        if not (over.any() and back.any()):
+            continue
+        less = over if over.sum() < back.sum() else back
+        number, total = number + int(less.sum()), total + int(known.sum())
+        if where is None:
+            where = np.floor(pixel[tuple(np.argwhere(less)[0])]).astype(int)
+    if where is None:
+        return None
+    return (
+        f"a wave folds over the CCD: {number:,} of its {total:,} cells of four rays arrive turned over, "
+        f"the first at pixel [{where[0]}, {where[1]}]; a sum of rays lacks the phase of the caustic, -pi/2: "
+        'take method="wavefront"'
+    )
+
+
+def costly(budget: Budget) -> str | None:
+    """Whether facets cost more than a twentieth of a wave.
+
+    Parameters
+    ----------
+    budget : Budget
+
+    Returns
+    -------
+    str or None
+    """
+    if budget.facets <= COSTLY or budget.costliest is None:
+        return None
+    name, worst = budget.costliest
+    finer = np.sqrt(budget.facets / COSTLY)
+    return (
+        f"facets cost {budget.facets:.2g} waves rms, over 1/20: those of {name!r} up to {worst:.2g}; if they "
+        "stand for a smooth surface, give it a form, such as forms.Smooth(), or facets "
+        f"{finer:.1f} times as small"
+    )
+
+
+def _ccd(paths: Paths) -> CCD:
+    if paths.ccd is None:
+        raise ValueError("guards: expected paths traced onto a CCD, got paths without one")
+    return paths.ccd
+
+
+def _rays(paths: Paths) -> int:
+    """Rays of the commonest path key."""
+    return int(np.unique(paths.key, return_counts=True)[1].max())
+
+
+def _commonest(paths: Paths) -> Iterator[Paths]:
+    """The paths of each of the commonest path keys."""
+    _, which, count = np.unique(paths.key, return_inverse=True, return_counts=True)
+    for kind in np.argsort(-count, kind="stable")[:KEYS]:
+        yield paths.where(np.flatnonzero(which.ravel() == kind))
+
+
+def _between(bright: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Pixels with light on both sides, in their row or in their column."""
+    padded = np.pad(bright, 1)
+    beside = padded[1:-1, :-2] & padded[1:-1, 2:]
+    above = padded[:-2, 1:-1] & padded[2:, 1:-1]
+    return np.asarray(beside | above)
+
+
+def _turned(paths: Paths, shape: tuple[int, int]) -> tuple[Array, Array, FloatArray]:
+    """Of each cell of four rays: whether it arrives turned over, whether all four do arrive, and where."""
+    place = np.full((shape[0] * shape[1], 2), np.nan)
+    place[paths.ray] = paths.pixel
+    grid = place.reshape(*shape, 2)
+    along = grid[:-1, 1:] - grid[:-1, :-1]
+    up = grid[1:, :-1] - grid[:-1, :-1]
+    area = along[..., 0] * up[..., 1] - along[..., 1] * up[..., 0]
+    known = np.isfinite(area) & np.isfinite(grid[1:, 1:, 0])
+    return np.nan_to_num(area) > 0.0, known, grid[:-1, :-1]
+
+
+def _broad(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Cells in a square of 2 x 2 of the mask, with no thin lines."""
+    square = mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]
+    padded = np.pad(square, 1)
+    return np.asarray(padded[:-1, :-1] | padded[1:, :-1] | padded[:-1, 1:] | padded[1:, 1:])
