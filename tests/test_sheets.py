@@ -1,4 +1,4 @@
-"""Sheets of arrivals: differences on grids with holes, caustics counted, what is refused."""
+"""Sheets of arrivals: caustics counted, rims, profiles, what is refused."""
 
 import math
 from dataclasses import replace
@@ -6,8 +6,6 @@ from dataclasses import replace
 import arrivals
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import fringetrace as ft
 from fringetrace import mm, nm, quadrature, sheets
@@ -24,41 +22,6 @@ def beam(count=17, width=5 * mm, **options):
 
 def camera(z, pitch=20e-6, count=16):
     return ft.CCD((0, 0, z), (0, 0, -1), (0, 1, 0), pitch, (count, count))
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.lists(st.floats(-2, 2), min_size=5, max_size=5), st.integers(5, 12), st.integers(0, 1))
-def test_differences_of_a_quartic_are_exact(coefficients, count, axis):
-    x = np.linspace(-1, 1, count)
-    values = np.polyval(coefficients, x)
-    grid = np.tile(values[:, None], 3) if axis == 0 else np.tile(values, (3, 1))
-    expected = np.polyval(np.polyder(coefficients), x) * (x[1] - x[0])
-    found = sheets.differences(grid, axis)
-    assert (found if axis == 0 else found.T) == pytest.approx(np.tile(expected[:, None], 3), abs=ROUNDING)
-
-
-def test_differences_go_up_to_a_hole_and_no_further():
-    values = np.arange(14.0) ** 4
-    values[8] = np.nan
-    found = sheets.differences(values[None], 1)[0]
-    assert np.isnan(found[8])
-    exact = 4 * np.arange(14.0) ** 3
-    long = np.r_[0:8, 9:14]
-    assert found[long] == pytest.approx(exact[long], rel=ROUNDING, abs=1e-9)
-
-
-@pytest.mark.parametrize(("run", "degree"), [(2, 1), (3, 2)])
-def test_short_runs_are_differenced_to_lower_order(run, degree):
-    values = np.full((1, 9), np.nan)
-    at = np.arange(run) + 3.0
-    values[0, 3 : 3 + run] = at**degree
-    found = sheets.differences(values, 1)[0]
-    assert found[3 : 3 + run] == pytest.approx(degree * at ** (degree - 1), abs=ROUNDING)
-    assert np.isnan(found[:3]).all()
-
-
-def test_a_lone_value_has_no_derivative():
-    assert np.isnan(sheets.differences(np.array([[np.nan, 1.0, np.nan]]), 1)).all()
 
 
 @pytest.mark.parametrize(

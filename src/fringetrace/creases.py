@@ -11,8 +11,8 @@ import numpy.typing as npt
 from fringetrace.paths import Fate, Paths
 from fringetrace.probes import parted
 from fringetrace.scene import Scene, Surface
-from fringetrace.sheets import along_grid
 from fringetrace.triangles import weld
+from fringetrace.tubes import along_grid
 from fringetrace.vectors import unit
 from fringetrace.waves import Array, FloatArray
 
@@ -22,6 +22,9 @@ SIDE, SPACING = 1e-3, 0.5
 LEADS, STEPS = 64, 4
 # Steps along columns and rows that are this near to one line (sine squared) lead nowhere.
 LOST = 1e-12
+# Nodes that are looked at: so many squared of the grid, and so many along columns or rows of a leg,
+# up to twice as many.
+MOST, NODES = 128, 32
 # Cells that a leg is carried on beyond its nodes.
 NEAR = 1.5
 # A leg's own start is known to this part of the scene's size. What it passes or meets does not lie
@@ -97,19 +100,23 @@ class Leg:
 
     Attributes
     ----------
-    nodes : (n, 2) int64
-        Column and row of those whose neighbours are there.
+    corner, stride : (2,) int64
+        Column and row of the first node of a grid, and cells from one to the next.
     number : (rows, columns) int64
-        Their numbers on the grid, -1 elsewhere.
+        Of its nodes whose neighbours are there; -1 elsewhere.
+    nodes : (n, 2) int64
+        Their columns and rows.
     start, direction : (n, 3) float64
     reach : (n,) float64, metres
         Infinite for the last leg.
     steps : (n, 2, 6) float64
-        Derivatives of start and direction along columns and rows.
+        Derivatives of start and direction along columns and rows of the beam's grid.
     """
 
-    nodes: npt.NDArray[np.int64]
+    corner: npt.NDArray[np.int64]
+    stride: npt.NDArray[np.int64]
     number: npt.NDArray[np.int64]
+    nodes: npt.NDArray[np.int64]
     start: FloatArray
     direction: FloatArray
     reach: FloatArray
@@ -135,7 +142,7 @@ class Leg:
         off = points[:, None] - self.start[lead]
         along = np.einsum("pnk,nk->pn", off, self.direction[lead])
         node = lead[np.argmin((off**2).sum(axis=-1) - along**2, axis=1)]
-        rows, columns = self.number.shape
+        most = np.array(self.number.shape[::-1]) - 1
         for _ in range(2 if parallel else STEPS):
             off, direction = points - self.start[node], self.direction[node]
             along = np.einsum("pk,pk->p", off, direction)
@@ -143,13 +150,14 @@ class Leg:
             slope -= np.einsum("pik,pk->pi", slope, direction)[..., None] * direction[:, None]
             miss = off - along[:, None] * direction
             at = self.nodes[node] + _solved(slope, miss)
-            near = np.rint(np.clip(at, 0, (columns - 1, rows - 1))).astype(np.int64)
-            number = self.number[near[:, 1], near[:, 0]]
+            place = np.clip((at - self.corner) / self.stride, 0, most)
+            column, row = np.rint(place).astype(np.int64).T
+            number = self.number[row, column]
             final = node
             node = np.where(number >= 0, number, node)
         there = along > START * np.abs(points).max(initial=0.0)
         there &= along < (1.0 + SLACK) * self.reach[final]
-        near = (np.abs(at - self.nodes[final]) <= NEAR).all(axis=1)
+        near = (np.abs(at - self.nodes[final]) <= NEAR * self.stride).all(axis=1)
         return np.asarray(at, dtype=np.float64), there, np.asarray(near)
 
 
@@ -163,8 +171,8 @@ def _solved(slope: FloatArray, miss: FloatArray) -> FloatArray:
     return np.where((bend > LOST * a * c)[:, None], step, 0.0)
 
 
-def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[Leg]:
-    """Legs of rays from the nodes of a beam's grid.
+def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[tuple[Leg, FloatArray]]:
+    """Legs of rays from the nodes of a beam's grid, and the edges of meshes that are near them.
 
     Parameters
     ----------
@@ -177,13 +185,29 @@ def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[Leg]:
     ------
     Leg
         One for each sequence of surfaces, parts of them and branches that enough neighbours share.
+    edges : (n, 2, 3) float64, metres
+        At least one.
     """
+    edges = creases(paths.scene)
+    every = np.where(np.array(shape) > NODES, int(np.ceil(np.sqrt(shape[0] * shape[1]) / MOST)), 1)
+    row, column = np.divmod(paths.ray, shape[1])
+    paths = paths.where((row % every[0] == 0) & (column % every[1] == 0))
+    for lines, ray in _lines(paths):
+        near = _near(lines, edges.seen_along(lines[:, 3:6].mean(axis=0)))
+        leg = _leg(lines, ray, shape[1], every[::-1]) if len(near) else None
+        if leg is not None:
+            yield leg, near
+
+
+def _lines(paths: Paths) -> Iterator[tuple[FloatArray, Array]]:
+    """Starts, directions and lengths (n, 7) of rays that met the same so far, and their numbers."""
     assert paths.surface is not None
     assert paths.triangle is not None
     assert paths.points is not None
     parts = parted(paths.scene)
     offset = np.cumsum([0] + [len(part) for part in parts])
     part = np.concatenate(parts)[(paths.triangle + offset[paths.surface]).clip(0)]
+    part -= part.min(initial=0)
     so_far = np.zeros(len(paths), dtype=np.int64)
     before = np.zeros((len(paths), 3))
     for leg in range(paths.surface.shape[1] + 1):
@@ -198,32 +222,45 @@ def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[Leg]:
         direction = unit(step)
         if leg > 0:
             turned = np.linalg.norm(direction - before[rows], axis=1) > START
-            met = [so_far[rows], paths.surface[rows, leg - 1], part[rows, leg - 1], turned]
-            so_far[rows] = np.unique(np.stack(met), axis=1, return_inverse=True)[1].ravel()
+            number = so_far[rows]
+            for met in (paths.surface[rows, leg - 1], part[rows, leg - 1], turned):
+                number = number * (int(met.max()) + 1) + met
+            so_far[rows] = np.unique(number, return_inverse=True)[1]
         before[rows] = direction
         lines = np.column_stack([paths.points[rows, leg], direction, reach])
         for group in np.unique(so_far[rows]):
             mine = so_far[rows] == group
-            found = _leg(lines[mine], paths.ray[rows[mine]], shape)
-            if found is not None:
-                yield found
+            yield lines[mine], paths.ray[rows[mine]]
 
 
-def _leg(lines: FloatArray, ray: Array, shape: tuple[int, int]) -> Leg | None:
-    """A leg of rays with starts, directions and lengths (n, 7); None where too few are neighbours."""
-    row, column = np.divmod(ray, shape[1])
-    top, left = int(row.min()), int(column.min())
-    grid = np.full((int(row.max()) + 1 - top, int(column.max()) + 1 - left, 7), np.nan)
-    grid[row - top, column - left] = lines
-    steps = along_grid(grid[..., :6])
+def _near(lines: FloatArray, ends: FloatArray) -> FloatArray:
+    """Edges (m, 2, 3) of some, (n, 2, 3), that are in the box around lines (k, 7), or little beyond."""
+    size = float((np.ptp(ends, axis=(0, 1)) + np.ptp(lines[:, :3], axis=0)).max()) if len(ends) else 0.0
+    reach = np.minimum(lines[:, 6], 2.0 * size)[:, None]
+    stops = np.stack([lines[:, :3], lines[:, :3] + reach * lines[:, 3:6]])
+    low, high = stops.min(axis=(0, 1)), stops.max(axis=(0, 1))
+    room = SLACK * (high - low).max()
+    inside = (ends.max(axis=1) >= low - room) & (ends.min(axis=1) <= high + room)
+    return np.asarray(ends[inside.all(axis=1)], dtype=np.float64)
+
+
+def _leg(lines: FloatArray, ray: Array, wide: int, every: Array) -> Leg | None:
+    """A leg of rays, `_lines`, from every so many of the nodes; None where too few are neighbours."""
+    place = np.stack([ray % wide, ray // wide])
+    corner = place.min(axis=1)
+    stride = every * np.maximum(1, (place.max(axis=1) - corner) // (NODES * every))
+    column, row = index = (place - corner[:, None]) // stride[:, None]
+    kept = (index * stride[:, None] == place - corner[:, None]).all(axis=0)
+    grid = np.full((int(row.max()) + 1, int(column.max()) + 1, 7), np.nan)
+    grid[row[kept], column[kept]] = lines[kept]
+    steps = along_grid(grid[..., :6]) / stride[:, None]
     known = np.isfinite(steps).all(axis=(2, 3))
     if not known.any():
         return None
-    nodes = np.argwhere(known)
-    number = np.full(shape, -1)
-    number[nodes[:, 0] + top, nodes[:, 1] + left] = np.arange(len(nodes))
-    place = nodes[:, ::-1] + (left, top)
-    return Leg(place, number, grid[known, :3], grid[known, 3:6], grid[known, 6], steps[known])
+    number = np.where(known, np.cumsum(known).reshape(known.shape) - 1, -1)
+    nodes = corner + np.argwhere(known)[:, ::-1] * stride
+    start, direction, reach = grid[known, :3], grid[known, 3:6], grid[known, 6]
+    return Leg(corner, stride, number, nodes, start, direction, reach, steps[known])
 
 
 def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, Mask]:
@@ -248,10 +285,9 @@ def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray,
     goes_on : (n,) bool
         Whether the next one is on the same side of the same edge.
     """
-    edges = creases(paths.scene)
     places, goes_on = [np.empty((0, 2))], [np.empty(0, dtype=np.bool_)]
-    for leg in legs(paths, shape):
-        at, on = _along(leg, edges.seen_along(leg.direction.mean(axis=0)))
+    for leg, edges in legs(paths, shape):
+        at, on = _along(leg, edges, np.array(shape[::-1]) - 1.0)
         places.append(at)
         goes_on.append(on)
     at, on = np.concatenate(places), np.concatenate(goes_on)
@@ -261,11 +297,10 @@ def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray,
     return at, on
 
 
-def _along(leg: Leg, ends: FloatArray) -> tuple[FloatArray, Mask]:
-    """Places beside edges (n, 2, 3) of meshes that a leg comes by, as `beside`."""
+def _along(leg: Leg, ends: FloatArray, size: FloatArray) -> tuple[FloatArray, Mask]:
+    """Places on a grid of a size beside edges (n, 2, 3) of meshes that a leg comes by, as `beside`."""
     at, there, _ = leg.nearest(ends.reshape(-1, 3))
     at, there = at.reshape(-1, 2, 2), there.reshape(-1, 2)
-    size = np.array(leg.number.shape[::-1]) - 1.0
     begin, end = _clipped(at, size)
     length = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
     kept = there.any(axis=1) & (begin < end) & (length > SIDE)

@@ -10,8 +10,9 @@ import numpy.typing as npt
 
 from fringetrace.outlines import main_axis
 from fringetrace.probes import RIM
-from fringetrace.sheets import Arrivals, caustics
+from fringetrace.sheets import Arrivals
 from fringetrace.squares import Pieces
+from fringetrace.tubes import caustics
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 # Rays that each cell is fitted to: three for each coefficient of a polynomial of degree 5, and one.

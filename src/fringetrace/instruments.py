@@ -65,8 +65,7 @@ def michelson(
     pixels : (rows, columns)
     rays : float
         Rays a pixel, along either axis: rays**2 in all, from the centres of its parts. The wavefront
-        does with fewer than one, such as 1/8: one in 8 x 8 pixels. Features narrower than the rays'
-        spacing may then be missed.
+        does with fewer than one, such as 1/8: one in 8 x 8 pixels.
     profile : callable, optional
         Amplitude of the beam at (x, y) of the image, metres; None is uniform. See `Gaussian`.
     arm : float, metres, optional

@@ -16,7 +16,6 @@ from fringetrace.sheets import (
     Sheet,
     arrivals,
     branch_turns,
-    differences,
     largest,
     leaved,
     patches,
@@ -24,6 +23,7 @@ from fringetrace.sheets import (
 )
 from fringetrace.squares import PIXEL, STRAIGHT, Pieces, Squares, quarters
 from fringetrace.survey import Survey, Witnesses
+from fringetrace.tubes import differences
 from fringetrace.waves import Array, FloatArray
 
 # Segments that an edge within a cell is drawn with, at most.

@@ -152,9 +152,10 @@ def survey(paths: Paths, half_wave_loss: bool = True) -> Survey:
     and from the centres of cells where `paths` met other surfaces than the rays from all four corners.
 
     What is not seen: surfaces that none of `paths` met on their way to the CCD's plane (the shadows
-    they cast are); features whose edges no leg of the nodes' rays comes near, such as those that only
-    light through a slit gets to; edges off curved mirrors that have features as narrow as the square
-    of a cell; of edges that would take more than `MOST` times the nodes' rays, some.
+    they cast are); what only light between the nodes gets to, such as a wire behind a slit; features
+    narrower than 1/256 of a cell; beyond curved mirrors features so narrow that steps linear between
+    the nodes miss them; and some of the edges where they would take more than `MOST` times the
+    nodes' rays.
 
     Parameters
     ----------
@@ -172,46 +173,56 @@ def survey(paths: Paths, half_wave_loss: bool = True) -> Survey:
     ValueError
         If the source is no beam, or there is no CCD.
     """
-    ccd, beam = checked(paths)
-    rows, _, _ = landed(paths, ccd)
-    keys, bounces = np.unique(paths.key[rows]), int(paths.bounces[rows].max(initial=0))
-    faintest = 0.5 * float(np.abs(paths.amplitude[rows]).min(initial=1.0))
-    probe = Probe(paths.scene, beam, ccd, parted(paths.scene), keys, bounces, faintest, half_wave_loss)
-    shape = beam.shape[0] + 1, beam.shape[1] + 1
+    probe = _probe(paths, half_wave_loss)
+    shape = probe.beam.shape[0] + 1, probe.beam.shape[1] + 1
     row, column = np.indices(shape)
     nodes = np.stack([column.ravel(), row.ravel()], axis=1).astype(np.float64)
     traced, rows, found, curved = probe.paths(nodes)
-    centres = _differing(paths, traced.where(rows), ccd, shape)
+    centres = _differing(paths, probe.ccd, traced.ray[rows], traced.key[rows], shape)
     between, goes_on = beside(traced, shape, MOST * len(nodes))
     extra = np.concatenate([between, centres])
     goes_on = np.concatenate([goes_on, np.zeros(len(centres), dtype=np.bool_)])
-    if len(extra):
-        more, others, its, bent = probe.paths(extra)
-        rows, found = np.append(rows, others + len(traced)), np.append(found, its)
-        curved = np.append(curved, bent)
-        traced = join([traced, replace(more, ray=more.ray + len(nodes))])
+    more, others, its, bent = probe.paths(extra)
+    # all that is kept of the paths from elsewhere is one of each sequence that no node has
+    _, new = np.unique(its, return_index=True)
+    new = new[~np.isin(its[new], found)]
+    if len(new):
+        kept = more.where(others[new])
+        traced = join([traced, replace(kept, ray=kept.ray + len(nodes))])
+    row = np.full(len(its), -1)
+    row[new] = np.arange(len(traced) - len(new), len(traced))
+    ray = np.append(traced.ray[rows], more.ray[others] + len(nodes))
+    rows, found, curved = np.append(rows, row), np.append(found, its), np.append(curved, bent)
     names, first = np.unique(found, return_index=True)
     order = np.argsort(found, kind="stable")
-    groups = np.split(rows[order], np.searchsorted(found[order], names)[1:]) if len(names) else []
-    rays = [traced.ray[group] for group in groups]
-    lit = [group[ray < len(nodes)] for group, ray in zip(groups, rays, strict=True)]
-    witnesses = [_witnesses(n, ray, extra, goes_on, shape) for n, ray in enumerate(rays) if len(extra)]
+    groups = np.split(order, np.searchsorted(found[order], names)[1:]) if len(names) else []
+    lit = [rows[group[ray[group] < len(nodes)]] for group in groups]
+    witnesses = [_witnesses(n, ray[group], extra, goes_on, shape) for n, group in enumerate(groups)]
     return Survey(
         probe, traced, np.concatenate([nodes, extra]), names, curved[first], rows[first], lit,
         Witnesses.joined(witnesses),
     )  # fmt: skip
 
 
-def _differing(paths: Paths, nodes: Paths, ccd: CCD, shape: tuple[int, int]) -> FloatArray:
-    """Centres (n, 2) of cells whose paths took none of the sequences of surfaces of all four corners."""
+def _probe(paths: Paths, half_wave_loss: bool) -> Probe:
+    """A probe for what paths of a beam took."""
+    ccd, beam = checked(paths)
     rows, _, _ = landed(paths, ccd)
-    tall, wide = shape[0] - 1, shape[1] - 1
-    differing = np.zeros((tall, wide), dtype=np.bool_)
-    for key in np.unique(paths.key[rows]):
-        corners = _corners(nodes.ray[nodes.key == key], shape)
-        centre = np.zeros((tall, wide), dtype=np.bool_)
-        centre.ravel()[paths.ray[rows[paths.key[rows] == key]]] = True
-        differing |= (corners.all(axis=-1) & ~centre) | (~corners.any(axis=-1) & centre)
+    keys, bounces = np.unique(paths.key[rows]), int(paths.bounces[rows].max(initial=0))
+    faintest = 0.5 * float(np.abs(paths.amplitude[rows]).min(initial=1.0))
+    return Probe(paths.scene, beam, ccd, parted(paths.scene), keys, bounces, faintest, half_wave_loss)
+
+
+def _differing(paths: Paths, ccd: CCD, node: Array, keys: Names, shape: tuple[int, int]) -> FloatArray:
+    """Centres (n, 2) of cells whose paths took other sequences than those from all four corners."""
+    rows, _, _ = landed(paths, ccd)
+    key, ray = paths.key[rows], paths.ray[rows]
+    differing = np.zeros((shape[0] - 1, shape[1] - 1), dtype=np.bool_)
+    for one in np.unique(key):
+        corners = _corners(node[keys == one], shape)
+        centre = np.zeros_like(differing)
+        centre.ravel()[ray[key == one]] = True
+        differing |= np.where(centre, ~corners.any(axis=-1), corners.all(axis=-1))
     return np.asarray(np.argwhere(differing)[:, ::-1] + 0.5, dtype=np.float64)
 
 
