@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from test_rims import COVERAGE, HENE, SIDE, landing, paraboloid, rms, scanned, seen
+from test_curved_mirrors import COVERAGE, HENE, SIDE, landing, paraboloid, rms, scanned, seen
 
 import fringetrace as ft
 from fringetrace import forms, instruments, mm, nm, probes, shapes, um
