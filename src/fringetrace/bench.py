@@ -16,7 +16,7 @@ from fringetrace.paths import Paths
 from fringetrace.quadrature import mutual_products
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.trace import stream, trace
-from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength, wavenumber
+from fringetrace.waves import Array, ComplexArray, FloatArray, checked_wavelength, wavenumber
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ class Bench:
             [0] is the light that met the sample only, [1] the reference. A phase step of delta
             on the reference multiplies [m] by exp(i m delta).
         """
-        return self._light(wavelength, "fields")
+        return self._kept(wavelength, "fields", lambda: self._found(wavelength, complex_field))
 
     def mutual(self, wavelength: float) -> ComplexArray:
         """Mutual intensities on the pixels of the light with m and n visits to the reference mirror.
@@ -114,27 +114,27 @@ class Bench:
             Mean of E_m conj(E_n) over each pixel, see `mutual_intensity`: fringes finer than a
             pixel have lost their visibility.
         """
-        return self._light(wavelength, "mutual")
+        return self._kept(wavelength, "mutual", lambda: self._found(wavelength, mutual_intensity))
 
-    def _light(self, wavelength: float, what: str) -> ComplexArray:
-        """Fields or mutual intensities, kept for the last wavelength."""
+    def _kept(self, wavelength: float, what: str, find: Callable[[], Array]) -> Array:
+        """What is found of the light of a wavelength, kept for the last one."""
         kept = self.derived.setdefault("light", {})
         wavelength = checked_wavelength(wavelength)
         if (wavelength, what) not in kept:
             for key in [key for key in kept if key[0] != wavelength]:
                 del kept[key]
-            kept[wavelength, what] = self._found(wavelength, what)
-        light: ComplexArray = kept[wavelength, what]
+            kept[wavelength, what] = find()
+        light: Array = kept[wavelength, what]
         return light
 
-    def _found(self, wavelength: float, what: str) -> ComplexArray:
+    def _found(self, wavelength: float, find: Callable[..., ComplexArray]) -> ComplexArray:
+        """Fields or mutual intensities."""
         paths = self.trace()
         if chosen(paths, self.method) == "rays":
-            if what == "mutual":
+            if find is mutual_intensity:
                 return mutual_products(self.fields(wavelength))
             return self._summed(paths.detected, wavelength)
         visits = paths.visits(self.reference)
-        find = mutual_intensity if what == "mutual" else complex_field
         light = find(paths, wavelength, groups=visits, method="wavefront")
         groups = light.shape[:-2]
         missing = [(0, max(0, 2 - n)) for n in groups]
@@ -266,7 +266,11 @@ class Bench:
         if steps < 3:
             raise ValueError(f"phase steps: expected at least 3, got {steps}")
         shifts = 2.0 * math.pi * np.arange(steps) / steps
-        return np.stack([self._recorded(wavelength, shift) for shift in shifts])
+
+        def frames() -> FloatArray:
+            return np.stack([self._recorded(wavelength, shift) for shift in shifts])
+
+        return self._kept(wavelength, f"{steps} steps", frames).copy()
 
     def carrier(self, wavelength: float) -> FloatArray:
         """Phase of the tilted reference wave over the pixels, 0 at the centre of the image.

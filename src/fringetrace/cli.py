@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
-import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fringetrace.bench import Bench
+    from fringetrace.budget import Budget
     from fringetrace.measurement import Measurement
     from fringetrace.paths import Paths
 
@@ -199,10 +199,14 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             seconds = time.perf_counter() - start
         measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
-        _say_budget(console, bench, wavelength)
+        costing = aside.submit(_costs, bench, wavelength)
         measurement.write_camera(measured, folder)
         measurement.write_pictures(measured, folder)
         measurement.write_netcdf(measured, folder / "result.nc")
+        costs, notes = costing.result()
+        _say(console, "budget", f"of the image: {costs.line}")
+        for note in notes:
+            _say(console, "note", note)
         missing = None if scene is None else scene.result()
         files = sorted(file.name for file in folder.iterdir())
     if missing is not None:
@@ -339,14 +343,13 @@ def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: 
     )
 
 
-def _say_budget(console: Console, bench: Bench, wavelength: float) -> None:
-    """The error budget, and what the guards warn of."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", fringetrace.FringetraceWarning)
-        costs = bench.budget(wavelength)
-    _say(console, "budget", costs.line)
-    for warning in caught:
-        _say(console, "note", str(warning.message))
+def _costs(bench: Bench, wavelength: float) -> tuple[Budget, list[str]]:
+    """The error budget, and what there is to warn of."""
+    from fringetrace import budget, guards
+
+    paths = bench.trace()
+    costs = budget(paths, wavelength, bench.method)
+    return costs, [*guards.found(paths, wavelength, bench.method), *filter(None, [guards.costly(costs)])]
 
 
 def _rms(measured: Measurement, where: Array) -> str:

@@ -30,8 +30,8 @@ class FringetraceWarning(UserWarning):
     """An image is not to be trusted: where, by how much, and what to do."""
 
 
-def check(paths: Paths, wavelength: float, method: str = "auto") -> None:
-    """Warn of aliased fringes, and for the ray sum of starved pixels and folded sheets.
+def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
+    """What there is to warn of: aliased fringes, and for the ray sum starved pixels and folded sheets.
 
     Parameters
     ----------
@@ -41,18 +41,36 @@ def check(paths: Paths, wavelength: float, method: str = "auto") -> None:
     method : {"auto", "wavefront", "rays"}
         How the field is found, see `complex_field`. The wavefront method needs no ray in each pixel, and
         knows folds.
+
+    Returns
+    -------
+    list of str
     """
     from fringetrace.field import chosen
 
     seen = paths.detected
     if len(seen) == 0:
-        return
-    found = [aliased(seen, wavelength)]
+        return []
+    texts = [aliased(seen, wavelength)]
     if chosen(paths, method) == "rays":
-        found += [starved(seen), folded(seen)]
-    for text in found:
-        if text is not None:
-            warnings.warn(text, FringetraceWarning, stacklevel=3)
+        texts += [starved(seen), folded(seen)]
+    return [text for text in texts if text is not None]
+
+
+def check(paths: Paths, wavelength: float, method: str = "auto") -> None:
+    """Warn of what `found` finds.
+
+    Parameters
+    ----------
+    paths, wavelength, method
+        As there.
+
+    Warns
+    -----
+    FringetraceWarning
+    """
+    for text in found(paths, wavelength, method):
+        warnings.warn(text, FringetraceWarning, stacklevel=3)
 
 
 def check_budget(budget: Budget) -> None:
@@ -130,10 +148,10 @@ def starved(paths: Paths) -> str | None:
     """
     ccd = _ccd(paths)
     holes, lit = np.zeros(ccd.shape, dtype=np.bool_), np.zeros(ccd.shape, dtype=np.bool_)
+    row, column = np.clip(np.floor(paths.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1).T
     for some in _commonest(paths):
-        row, column = np.clip(np.floor(some.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1).T
         bright = np.zeros(ccd.shape, dtype=np.bool_)
-        bright[row, column] = True
+        bright[row[some], column[some]] = True
         lit |= bright
         holes |= _between(bright) & ~bright
     number, total = int(holes.sum()), int((lit | holes).sum())
@@ -170,7 +188,7 @@ def folded(paths: Paths) -> str | None:
         return None
     number, total, where = 0, 0, None
     for some in _commonest(paths):
-        turned, known, pixel = _turned(some, paths.source.shape)
+        turned, known, pixel = _turned(paths.ray[some], paths.pixel[some], paths.source.shape)
         over, back = _broad(turned & known), _broad(~turned & known)
         if not (over.any() and back.any()):
             continue
@@ -220,11 +238,11 @@ def _rays(paths: Paths) -> int:
     return int(np.unique(paths.key, return_counts=True)[1].max())
 
 
-def _commonest(paths: Paths) -> Iterator[Paths]:
-    """The paths of each of the commonest path keys."""
-    _, which, count = np.unique(paths.key, return_inverse=True, return_counts=True)
+def _commonest(paths: Paths) -> Iterator[Array]:
+    """The rows of each of the commonest path keys."""
+    keys, count = np.unique(paths.key, return_counts=True)
     for kind in np.argsort(-count, kind="stable")[:KEYS]:
-        yield paths.where(np.flatnonzero(which.ravel() == kind))
+        yield np.flatnonzero(paths.key == keys[kind])
 
 
 def _between(bright: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
@@ -235,10 +253,10 @@ def _between(bright: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     return np.asarray(beside | above)
 
 
-def _turned(paths: Paths, shape: tuple[int, int]) -> tuple[Array, Array, FloatArray]:
+def _turned(ray: Array, pixel: FloatArray, shape: tuple[int, int]) -> tuple[Array, Array, FloatArray]:
     """Of each cell of four rays: whether it arrives turned over, whether all four do arrive, and where."""
     place = np.full((shape[0] * shape[1], 2), np.nan)
-    place[paths.ray] = paths.pixel
+    place[ray] = pixel
     grid = place.reshape(*shape, 2)
     along = grid[:-1, 1:] - grid[:-1, :-1]
     up = grid[1:, :-1] - grid[:-1, :-1]

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -131,12 +132,16 @@ class Paths:
         chosen = {name: getattr(self, name)[mask] for name in COLUMNS if getattr(self, name) is not None}
         return replace(self, **chosen)
 
-    @property
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @cached_property
     def detected(self) -> Paths:
         """The paths that reached the CCD."""
-        return self.where(self.fate == Fate.DETECTED)
+        seen = self.fate == Fate.DETECTED
+        return self if seen.all() else self.where(seen)
 
-    @property
+    @cached_property
     def pixel(self) -> FloatArray:
         """(m, 2) float64: CCD coordinates (row, column) in pixels; NaN where not detected.
 
@@ -146,6 +151,7 @@ class Paths:
         if self.ccd is not None:
             seen = np.flatnonzero(self.fate == Fate.DETECTED)
             pixel[seen] = pixels(self.ccd, self.origin[seen])
+        pixel.setflags(write=False)  # kept
         return pixel
 
     def sequence(self, row: int) -> list[tuple[int, bool]]:
