@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from fringetrace.bounds import Bounds, bounds
 from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
-from fringetrace.guards import FringetraceWarning
 from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
@@ -24,6 +23,7 @@ from fringetrace.waves import degree, mm, nm, um
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace.guards import FringetraceWarning
 
 __all__ = [
     "CCD",
@@ -69,6 +69,10 @@ _ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views
 def __getattr__(name: str) -> Any:
     if name in _ROOMS:
         return import_module(f"fringetrace.{name}")
+    if name == "FringetraceWarning":
+        from fringetrace.guards import FringetraceWarning
+
+        return FringetraceWarning
     if name == "__version__":
         from importlib.metadata import version
 
@@ -77,4 +81,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_ROOMS, "__version__"])
+    return sorted([*globals(), *_ROOMS, "FringetraceWarning", "__version__"])

@@ -197,9 +197,9 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             start = time.perf_counter()
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
+        costing = aside.submit(_costs, bench, wavelength)
         measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
-        costing = aside.submit(_costs, bench, wavelength)
         measurement.write_camera(measured, folder)
         measurement.write_pictures(measured, folder)
         measurement.write_netcdf(measured, folder / "result.nc")

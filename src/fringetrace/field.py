@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.paths import Paths, join, screen
-from fringetrace.quadrature import mutual_products
 from fringetrace.scene import Beam
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
 
@@ -132,6 +131,8 @@ def mutual_intensity(
     method, parts = _method(paths, method)
     if method == "wavefront":
         return _wavefront(parts, wavelength, groups, False, half_wave_loss)[1]
+    from fringetrace.quadrature import mutual_products
+
     return mutual_products(complex_field(parts, wavelength, method, half_wave_loss, groups))
 
 

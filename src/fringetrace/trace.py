@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from fringetrace.engine import Engine, Hits, Limits, aim, build, find, follow
 from fringetrace.paths import Fate, Paths, join, screen
 from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
+    from fringetrace.engine import Engine, Hits
     from fringetrace.refine import Formed
 
 Progress = Callable[[int, int], None]
@@ -90,6 +90,8 @@ def _plan(
     most = _whole(max_bounces, 0, "max_bounces")
     if not (isinstance(min_amplitude, Real) and np.isfinite(min_amplitude) and min_amplitude >= 0.0):
         raise ValueError(f"min_amplitude: expected a number of at least 0, got {min_amplitude!r}")
+    from fringetrace.engine import build
+
     passed = frozenset(scene.index(name) for name in source.passes)
     engine = build(
         scene, passed | {i for i, surface in enumerate(scene.surfaces) if surface.form is not None}
@@ -156,6 +158,8 @@ class Workspace:
     @staticmethod
     def blank(rows: int, branches: int) -> Workspace:
         """Room for so many rays, each of which may split into some branches."""
+        from fringetrace.engine import Hits
+
         room = rows * branches
         return Workspace(blank(Batch, room), Hits.blank(room), blank(Ends, room))
 
@@ -178,6 +182,7 @@ def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, ol
 def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
     """Follow the rays from `first` up to `stop` to all their ends: in `ends`, or in the workspace."""
     from fringetrace.bounces import interact
+    from fringetrace.engine import Hits, Limits, aim, find, follow
 
     rays = plan.rays(first, stop)
     if len(space.state.ray) < len(rays):
