@@ -189,7 +189,9 @@ def dropped(side: int) -> Skip:
         return again
 
     work = tracing(scene, beam)
-    return Skip("finished rays leave the batch", "80 rods, open", work, without(work, "find", asked, "engine"))
+    return Skip(
+        "finished rays leave the batch", "80 rods, open", work, without(work, "find", asked, "engine")
+    )
 
 
 def unrecorded(side: int) -> Skip:
