@@ -164,3 +164,12 @@ UNKNOWN = np.full((3, 3), np.nan)
 def test_rotations_keep_lengths_and_hands(matrix):
     with pytest.raises(ValueError, match=r"turn: expected a rotation matrix, got \[\["):
         vectors.checked_rotation(matrix, "turn")
+
+
+def test_a_component_has_the_same_bits_in_any_company():
+    rows = np.random.default_rng(4).normal(size=(999, 3))
+    axis = np.array([0.3, -0.2, 0.933])
+    whole = vectors.component(rows, axis)
+    np.testing.assert_allclose(whole, rows @ axis, rtol=0, atol=1e-15)
+    alone = np.concatenate([vectors.component(row[None], axis) for row in rows])
+    np.testing.assert_array_equal(alone, whole)

@@ -96,6 +96,20 @@ def weigh(lost, amplitude, reflections, row, gone, left, mirrored):
     lost[row], amplitude[row], reflections[row] = gone, left, mirrored
 
 
+@part
+def latest(path, dx, dy, dz, bx, by, bz):
+    """From where a ray comes to a face: along its leg, or, if that has no length, as it came before."""
+    far = path > 0.0
+    return (dx if far else bx), (dy if far else by), (dz if far else bz)
+
+
+@part
+def follows(came, last, serial, row, bx, by, bz, met, number):
+    """Write from where a row of a batch came, the triangle it has met, and its serial number."""
+    came[row, 0], came[row, 1], came[row, 2] = bx, by, bz
+    last[row], serial[row] = met, number
+
+
 @jit
 def begin(start, along, length, first, batch):
     """Fill a batch with rays that have met nothing yet; the amplitude is that of the path alone."""
@@ -103,10 +117,9 @@ def begin(start, along, length, first, batch):
     for i in range(len(start)):
         x, y, z, dx, dy, dz = start[i, 0], start[i, 1], start[i, 2], along[i, 0], along[i, 1], along[i, 2]
         depart(state, i, x, y, z, dx, dy, dz, 0.0, 0.0, 0.0, length[i], 0.0)
-        came[i, 0], came[i, 1], came[i, 2] = dx, dy, dz
+        follows(came, last, serial, i, dx, dy, dz, -1, i)
         label(key, ray, bounces, i, np.uint64(0), first + i, 0)
         weigh(lost, amplitude, reflections, i, 0.0, 1.0, 0)
-        serial[i], last[i] = i, -1
 
 
 @part
@@ -191,9 +204,7 @@ def rebound(
                 facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
                 inverted = 1.0 / facing
         path = path * unscale if guess >= 0 else np.inf
-        fate, reach = fated(
-            screen, has_screen, max_bounces, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz
-        )  # fmt: skip
+        fate, reach = fated(screen, has_screen, max_bounces, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz)
         if fate != ALIVE:
             gx, gy, gz, way = gx + reach * dx, gy + reach * dy, gz + reach * dz, way + reach
             end = ray[row] - first
@@ -202,10 +213,9 @@ def rebound(
             ended += 1
             continue
         if not oriented:  # nobody else asks from where a ray came
-            far = path > 0.0
-            came[kept, 0] = dx if far else came[row, 0]
-            came[kept, 1] = dy if far else came[row, 1]
-            came[kept, 2] = dz if far else came[row, 2]
+            came[kept, 0], came[kept, 1], came[kept, 2] = latest(
+                path, dx, dy, dz, came[row, 0], came[row, 1], came[row, 2]
+            )
         k = np.uintp(guess)
         nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
         height = nx * px + ny * py + nz * pz + planes[k, 3]
@@ -242,10 +252,9 @@ def close_up(batch, start, born, to, faint, ends, ended):
             continue
         for k in range(state.shape[1]):
             state[to, k] = state[old, k]
-        came[to, 0], came[to, 1], came[to, 2] = came[old, 0], came[old, 1], came[old, 2]
+        follows(came, last, serial, to, came[old, 0], came[old, 1], came[old, 2], last[old], serial[old])
         label(key, ray, bounces, to, key[old], ray[old], bounces[old])
         weigh(lost, amplitude, reflections, to, 0.0, amplitude[old], reflections[old])
-        last[to], serial[to] = last[old], serial[old]
         to += 1
     return to, ended
 
@@ -281,9 +290,7 @@ def interact(
             surface, through = owner[np.uintp(k)], False
             x, y, z, way, steps = px, py, pz, way + path, steps + 1
             here = here * base + np.uint64(2 * surface + 1)
-            bx, by, bz = dx, dy, dz
-            if not path > 0.0:
-                bx, by, bz = came[row, 0], came[row, 1], came[row, 2]
+            bx, by, bz = latest(path, dx, dy, dz, came[row, 0], came[row, 1], came[row, 2])
             if not plain:
                 r, t = reflection[surface], transmission[surface]
                 r2, t2 = square(r), square(t)
@@ -291,10 +298,9 @@ def interact(
                 if r2 > 0.0 and t2 > 0.0:
                     new = count + born
                     depart(state, new, x, y, z, dx, dy, dz, nx, ny, nz, way, rim)
-                    came[new, 0], came[new, 1], came[new, 2] = bx, by, bz
+                    follows(came, last, serial, new, bx, by, bz, k, serials + born)
                     label(key, ray, bounces, new, here + np.uint64(1), number, steps)
                     weigh(lost, amplitude, reflections, new, 0.0, before * t, mirrored)
-                    last[new], serial[new] = k, serials + born
                     born += 1
                 before, through, fate = onward(before, r, t, faint)
                 mirrored += r2 > 0.0 and t2 == 0.0
@@ -304,9 +310,8 @@ def interact(
                 dx, dy, dz = bounced(dx, dy, dz, nx, ny, nz, nx * dx + ny * dy + nz * dz, steps)
         if fate == ALIVE:
             depart(state, kept, x, y, z, dx, dy, dz, nx, ny, nz, way, rim)
-            came[kept, 0], came[kept, 1], came[kept, 2] = bx, by, bz
+            follows(came, last, serial, kept, bx, by, bz, k, serial[row])
             label(key, ray, bounces, kept, here, number, steps)
-            last[kept], serial[kept] = k, serial[row]
             if not plain:
                 weigh(lost, amplitude, reflections, kept, gone, before, mirrored)
             kept += 1

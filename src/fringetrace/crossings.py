@@ -85,12 +85,6 @@ def dot(a: FloatArray, b: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ij,ij->i", a, b), dtype=np.float64)
 
 
-def component(a: FloatArray, axis: FloatArray) -> FloatArray:
-    """Components (n,) of the rows of (n, 3) along one axis (3,)."""
-    # not a matrix product: its last bits depend on how many rows there are
-    return np.asarray(np.einsum("ij,j->i", a, axis), dtype=np.float64)
-
-
 def advance(value: FloatArray, slope: FloatArray, bend: FloatArray, side: FloatArray) -> FloatArray:
     """Way to the root of value + slope s + bend s^2 / 2 at which the slope has the sign of `side`.
 

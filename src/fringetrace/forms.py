@@ -13,9 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.crossings import Fit, component, dot, fit_level
+from fringetrace.crossings import Fit, dot, fit_level
 from fringetrace.patches import patched, vertex_normals
-from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, unit
+from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, component, unit
 from fringetrace.waves import FloatArray
 
 

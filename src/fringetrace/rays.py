@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.scene import Beam, as_names
-from fringetrace.vectors import unit
+from fringetrace.vectors import component, unit
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 
@@ -151,7 +151,7 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
     amplitude = np.broadcast_to(np.complex128(1.0), (count,))  # read-only, and takes no room
     if beam.profile is not None:
         offset = origin - beam.centre
-        values = np.asarray(beam.profile(offset @ u, offset @ v))
+        values = np.asarray(beam.profile(component(offset, u), component(offset, v)))
         if values.shape not in ((), (count,)) or not np.isfinite(values).all():
             raise ValueError(
                 f"Beam profile: expected a finite amplitude for each of {count} rays, "

@@ -1,4 +1,4 @@
-"""The bounce passes: hit, interact, split, drop the finished, again; in chunks, on a thread pool."""
+"""A beam or rays through a scene: chunk by chunk, on a thread pool."""
 
 from __future__ import annotations
 
@@ -7,61 +7,26 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
 from numbers import Real
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from fringetrace.paths import Fate, Paths, join, screen
-from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
+from fringetrace.passes import Plan, Record, Workspace, advance, tables
+from fringetrace.paths import Paths, join, screen
+from fringetrace.rays import Ends, Rays, blank, part
 from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.waves import Array, ComplexArray, FloatArray
+from fringetrace.waves import ComplexArray
 
 if TYPE_CHECKING:
-    from fringetrace.engine import Engine, Hits
+    from fringetrace.engine import Engine
     from fringetrace.refine import Formed
 
 Progress = Callable[[int, int], None]
 Result = TypeVar("Result")
 # Fewer rays: what a pass costs in Python shows (30 us each). More: memory, 10 MB a thread here.
 CHUNK = 32768
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """All that a chunk needs to know, the same for every thread.
-
-    `plain`: all surfaces reflect with -1, so that amplitudes follow from the number of bounces.
-    `splits`: some surface sends light both ways, so that a ray may have many ends.
-    """
-
-    scene: Scene
-    source: Beam | Rays
-    ccd: CCD | None
-    engine: Engine
-    forms: tuple[Formed, ...]
-    passed: frozenset[int]
-    reflection: ComplexArray
-    transmission: ComplexArray
-    screen: tuple[float, ...]
-    max_bounces: int
-    faint: float
-    record: bool
-    plain: bool
-    splits: bool
-
-    @property
-    def total(self) -> int:
-        """How many rays there are."""
-        source = self.source
-        return source.shape[0] * source.shape[1] if isinstance(source, Beam) else len(source)
-
-    def rays(self, first: int, stop: int) -> Rays:
-        """Some of the rays."""
-        source = self.source
-        return launch(source, first, stop) if isinstance(source, Beam) else source.part(first, stop)
 
 
 def _whole(value: int, least: int, what: str) -> int:
@@ -117,137 +82,9 @@ def _plan(
     )
 
 
-class _Record:
-    """Triangles and points of the paths of a chunk, by serial number: one column for each pass."""
-
-    def __init__(self, start: FloatArray) -> None:
-        self.points = [start.copy()]
-        self.triangles: list[Array] = []
-
-    def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
-        """Append a pass: paths born in it inherit, those named by `serials` met a triangle."""
-        self.points = [np.concatenate([column, column[parents]]) for column in self.points]
-        self.triangles = [np.concatenate([column, column[parents]]) for column in self.triangles]
-        total = len(self.points[0])
-        met, where = np.full(total, -1, dtype=np.int64), np.full((total, 3), np.nan)
-        met[serials], where[serials] = triangle, point
-        self.triangles.append(met)
-        self.points.append(where)
-
-
-@dataclass(frozen=True, eq=False)
-class Chunk:
-    """A chunk of rays whose paths have all ended, as many as `rows`."""
-
-    ends: Ends
-    rows: int
-    rays: Rays
-    segments: int
-    doubtful: int
-    record: _Record | None
-
-
-@dataclass(eq=False)
-class Workspace:
-    """Arrays that a thread keeps from chunk to chunk."""
-
-    state: Batch
-    hits: Hits
-    ends: Ends
-
-    @staticmethod
-    def blank(rows: int, branches: int) -> Workspace:
-        """Room for so many rays, each of which may split into some branches."""
-        from fringetrace.engine import Hits
-
-        room = rows * branches
-        return Workspace(blank(Batch, room), Hits.blank(room), blank(Ends, room))
-
-
-def _noted(record: _Record, plan: Plan, before: dict[str, Array], ends: Ends, old: int, hits: Hits) -> None:
-    """Write down a pass: every path that met something, on its way or at its end."""
-    count = len(before["serial"])
-    met = (hits.triangle[:count] >= 0) & (before["bounces"] < plan.max_bounces)
-    landed = ends.serial[old:][ends.fate[old:] == Fate.DETECTED]
-    met &= ~np.isin(before["serial"], landed)
-    splits = abs(plan.reflection) * abs(plan.transmission) > 0.0
-    parents = np.flatnonzero(met)
-    parents = parents[splits[plan.engine.owner[hits.triangle[parents]]]]
-    first = len(record.points[0])
-    serials = np.concatenate([before["serial"][met], np.arange(first, first + len(parents))])
-    rows = np.concatenate([np.flatnonzero(met), parents])
-    record.add(before["serial"][parents], serials, hits.triangle[rows], hits.met[rows, 1:4])
-
-
-def _advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
-    """Follow the rays from `first` up to `stop` to all their ends: in `ends`, or in the workspace."""
-    from fringetrace.bounces import interact
-    from fringetrace.engine import Hits, Limits, aim, find, follow
-
-    rays = plan.rays(first, stop)
-    if len(space.state.ray) < len(rays):
-        space.state, space.hits = blank(Batch, len(rays)), Hits.blank(len(rays))
-    start(space.state, rays, first)
-    record = _Record(rays.origin) if plan.record else None
-    ordered = ends is not None
-    ends = space.ends if ends is None else ends
-    count, ended, serials, segments, doubtful, bounces = len(rays), 0, len(rays), 0, 0, 1
-    passed = plan.passed
-    limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
-    simple = plan.plain and ordered and len(plan.engine.bodies) == 1 and not plan.forms
-    while count:
-        if simple and segments:
-            segments += count
-            count, _, unsure = follow(plan.engine, space.state, count, bounces, space.hits, ends, limits)
-            bounces += 1
-            doubtful += unsure
-            continue
-        if plan.splits and 2 * count > len(space.state.ray):
-            space.state, space.hits = grown(space.state, 4 * count), Hits.blank(4 * count)
-        if not ordered and ended + (2 if plan.splits else 1) * count > len(ends.ray):
-            space.ends = ends = grown(ends, 2 * (ended + 2 * count))
-        state, hits = space.state, space.hits
-        segments += count
-        if plan.forms:
-            from fringetrace.refine import find as find_exact
-
-            doubtful += find_exact(plan.engine, plan.forms, state, count, hits, passed)
-        else:
-            doubtful += find(plan.engine, state, count, hits, passed)
-        passed = frozenset()
-        before: dict[str, Array] = {}
-        if record is not None:
-            before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()}
-        old = ended
-        count, ended, serials = interact(
-            count, state.columns, hits.met, hits.triangle, plan.engine.owner, plan.reflection,
-            plan.transmission, plan.plain, limits.packed, plan.faint, ends.columns, ended,
-            first if ordered else -1, serials,
-        )  # fmt: skip
-        if simple:
-            aim(plan.engine, state, count, hits, 0, True, cull=False)
-        if record is not None:
-            _noted(record, plan, before, part(ends, 0, ended), old, hits)
-    return Chunk(ends, ended, rays, segments, doubtful, record)
-
-
-def _recorded(plan: Plan, record: _Record, ends: Ends) -> dict[str, Array]:
-    """The record as the padded tables of `Paths`."""
-    depth = int(ends.bounces.max(initial=0))
-    none = np.full(len(record.points[0]), -1, dtype=np.int64)
-    triangle = np.stack([*record.triangles, none], axis=1)[ends.serial, :depth]
-    surface = np.where(triangle >= 0, plan.engine.owner[triangle], -1).astype(np.int64)
-    points = np.full((len(triangle), depth + 2, 3), np.nan)
-    points[:, : depth + 1] = np.stack(record.points[: depth + 1], axis=1)[ends.serial]
-    landed = np.flatnonzero(ends.fate == Fate.DETECTED)
-    points[landed, ends.bounces[landed] + 1] = ends.origin[landed]
-    local = np.where(triangle >= 0, triangle - plan.engine.offset[surface], -1)
-    return {"surface": surface, "triangle": local, "points": points}
-
-
 def _paths(
     plan: Plan, ends: Ends, first: int, launched: ComplexArray, segments: int, doubtful: int,
-    record: _Record | None = None, whole: bool = False,
+    record: Record | None = None, whole: bool = False,
 ) -> Paths:  # fmt: skip
     """The table of what has ended, sorted by ray; `launched` are the amplitudes from ray `first` on.
 
@@ -287,7 +124,7 @@ def _paths(
         scene=plan.scene,
         source=plan.source,
         ccd=plan.ccd,
-        **({} if record is None else _recorded(plan, record, ends)),
+        **({} if record is None else tables(plan, record, ends)),
     )
 
 
@@ -351,7 +188,7 @@ def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress |
 
     def work(first: int, stop: int) -> Paths:
         with spaces.one() as space:
-            done = _advance(plan, space, None, first, stop)
+            done = advance(plan, space, None, first, stop)
             launched = np.asarray(done.rays.amplitude)
             ends = part(done.ends, 0, done.rows)
             return _paths(plan, ends, first, launched, done.segments, done.doubtful, done.record)
@@ -370,7 +207,7 @@ def _at_once(plan: Plan, threads: int | None, chunk: int, progress: Progress | N
 
     def work(first: int, stop: int) -> tuple[int, int]:
         with spaces.one() as space:
-            done = _advance(plan, space, part(ends, first, stop), first, stop)
+            done = advance(plan, space, part(ends, first, stop), first, stop)
         if not uniform:
             launched[first:stop] = done.rays.amplitude
         return done.segments, done.doubtful

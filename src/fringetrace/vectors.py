@@ -83,6 +83,22 @@ def unit(vectors: FloatArray) -> FloatArray:
     return np.asarray(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True), dtype=np.float64)
 
 
+def component(vectors: FloatArray, axis: FloatArray) -> FloatArray:
+    """Components along one axis.
+
+    Parameters
+    ----------
+    vectors : (n, 3) float64
+    axis : (3,) float64
+
+    Returns
+    -------
+    (n,) float64
+        The same bits for each row, whatever the others: a matrix product's depend on how many there are.
+    """
+    return np.asarray(np.einsum("ij,j->i", vectors, axis), dtype=np.float64)
+
+
 def frame(normal: npt.ArrayLike, up: npt.ArrayLike, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Axes of a rectangle seen along `normal`; (v, u, n) is right-handed.
 

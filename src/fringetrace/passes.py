@@ -1,0 +1,207 @@
+"""The passes of a chunk of rays, until all its paths have ended: hit, interact, split, drop, again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fringetrace.paths import Fate
+from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
+from fringetrace.scene import CCD, Beam, Scene
+from fringetrace.waves import Array, ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.engine import Engine, Hits
+    from fringetrace.refine import Formed
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """All that a chunk needs to know, the same for every thread.
+
+    `plain`: all surfaces reflect with -1, so that amplitudes follow from the number of bounces.
+    `splits`: some surface sends light both ways, so that a ray may have many ends.
+    """
+
+    scene: Scene
+    source: Beam | Rays
+    ccd: CCD | None
+    engine: Engine
+    forms: tuple[Formed, ...]
+    passed: frozenset[int]
+    reflection: ComplexArray
+    transmission: ComplexArray
+    screen: tuple[float, ...]
+    max_bounces: int
+    faint: float
+    record: bool
+    plain: bool
+    splits: bool
+
+    @property
+    def total(self) -> int:
+        """How many rays there are."""
+        source = self.source
+        return source.shape[0] * source.shape[1] if isinstance(source, Beam) else len(source)
+
+    def rays(self, first: int, stop: int) -> Rays:
+        """Some of the rays."""
+        source = self.source
+        return launch(source, first, stop) if isinstance(source, Beam) else source.part(first, stop)
+
+
+class Record:
+    """Triangles and points of the paths of a chunk, by serial number: one column for each pass."""
+
+    def __init__(self, start: FloatArray) -> None:
+        self.points = [start.copy()]
+        self.triangles: list[Array] = []
+
+    def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
+        """Append a pass: paths born in it inherit, those named by `serials` met a triangle."""
+        self.points = [np.concatenate([column, column[parents]]) for column in self.points]
+        self.triangles = [np.concatenate([column, column[parents]]) for column in self.triangles]
+        total = len(self.points[0])
+        met, where = np.full(total, -1, dtype=np.int64), np.full((total, 3), np.nan)
+        met[serials], where[serials] = triangle, point
+        self.triangles.append(met)
+        self.points.append(where)
+
+
+@dataclass(frozen=True, eq=False)
+class Chunk:
+    """A chunk of rays whose paths have all ended, as many as `rows`."""
+
+    ends: Ends
+    rows: int
+    rays: Rays
+    segments: int
+    doubtful: int
+    record: Record | None
+
+
+@dataclass(eq=False)
+class Workspace:
+    """Arrays that a thread keeps from chunk to chunk."""
+
+    state: Batch
+    hits: Hits
+    ends: Ends
+
+    @staticmethod
+    def blank(rows: int, branches: int) -> Workspace:
+        """Room for so many rays, each of which may split into some branches."""
+        from fringetrace.engine import Hits
+
+        room = rows * branches
+        return Workspace(blank(Batch, room), Hits.blank(room), blank(Ends, room))
+
+
+def _noted(record: Record, plan: Plan, before: dict[str, Array], ends: Ends, old: int, hits: Hits) -> None:
+    """Write down a pass: every path that met something, on its way or at its end."""
+    count = len(before["serial"])
+    met = (hits.triangle[:count] >= 0) & (before["bounces"] < plan.max_bounces)
+    landed = ends.serial[old:][ends.fate[old:] == Fate.DETECTED]
+    met &= ~np.isin(before["serial"], landed)
+    splits = abs(plan.reflection) * abs(plan.transmission) > 0.0
+    parents = np.flatnonzero(met)
+    parents = parents[splits[plan.engine.owner[hits.triangle[parents]]]]
+    first = len(record.points[0])
+    serials = np.concatenate([before["serial"][met], np.arange(first, first + len(parents))])
+    rows = np.concatenate([np.flatnonzero(met), parents])
+    record.add(before["serial"][parents], serials, hits.triangle[rows], hits.met[rows, 1:4])
+
+
+def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
+    """Follow rays to all their ends.
+
+    Parameters
+    ----------
+    plan : Plan
+    space : Workspace
+    ends : Ends, optional
+        Where they end, a row for each ray, where no ray splits. Default: in the workspace.
+    first, stop : int
+        Which rays: from and to.
+
+    Returns
+    -------
+    Chunk
+    """
+    from fringetrace.bounces import interact
+    from fringetrace.engine import Hits, Limits, aim, find, follow
+
+    rays = plan.rays(first, stop)
+    if len(space.state.ray) < len(rays):
+        space.state, space.hits = blank(Batch, len(rays)), Hits.blank(len(rays))
+    start(space.state, rays, first)
+    record = Record(rays.origin) if plan.record else None
+    ordered = ends is not None
+    ends = space.ends if ends is None else ends
+    count, ended, serials, segments, doubtful, bounces = len(rays), 0, len(rays), 0, 0, 1
+    passed = plan.passed
+    limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
+    simple = plan.plain and ordered and len(plan.engine.bodies) == 1 and not plan.forms
+    while count:
+        if simple and segments:
+            segments += count
+            count, _, unsure = follow(plan.engine, space.state, count, bounces, space.hits, ends, limits)
+            bounces += 1
+            doubtful += unsure
+            continue
+        if plan.splits and 2 * count > len(space.state.ray):
+            space.state, space.hits = grown(space.state, 4 * count), Hits.blank(4 * count)
+        if not ordered and ended + (2 if plan.splits else 1) * count > len(ends.ray):
+            space.ends = ends = grown(ends, 2 * (ended + 2 * count))
+        state, hits = space.state, space.hits
+        segments += count
+        if plan.forms:
+            from fringetrace.refine import find as find_exact
+
+            doubtful += find_exact(plan.engine, plan.forms, state, count, hits, passed)
+        else:
+            doubtful += find(plan.engine, state, count, hits, passed)
+        passed = frozenset()
+        before: dict[str, Array] = {}
+        if record is not None:
+            before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()}
+        old = ended
+        count, ended, serials = interact(
+            count, state.columns, hits.met, hits.triangle, plan.engine.owner, plan.reflection,
+            plan.transmission, plan.plain, limits.packed, plan.faint, ends.columns, ended,
+            first if ordered else -1, serials,
+        )  # fmt: skip
+        if simple:
+            aim(plan.engine, state, count, hits, 0, True, cull=False)
+        if record is not None:
+            _noted(record, plan, before, part(ends, 0, ended), old, hits)
+    return Chunk(ends, ended, rays, segments, doubtful, record)
+
+
+def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
+    """The record of a chunk as the padded tables of `Paths`: surface, triangle, points.
+
+    Parameters
+    ----------
+    plan : Plan
+    record : Record
+    ends : Ends
+        In the order of the tables' rows.
+
+    Returns
+    -------
+    dict of str to array
+        (m, b) int64, (m, b) int64, and (m, b + 2, 3) float64 in metres.
+    """
+    depth = int(ends.bounces.max(initial=0))
+    none = np.full(len(record.points[0]), -1, dtype=np.int64)
+    triangle = np.stack([*record.triangles, none], axis=1)[ends.serial, :depth]
+    surface = np.where(triangle >= 0, plan.engine.owner[triangle], -1).astype(np.int64)
+    points = np.full((len(triangle), depth + 2, 3), np.nan)
+    points[:, : depth + 1] = np.stack(record.points[: depth + 1], axis=1)[ends.serial]
+    landed = np.flatnonzero(ends.fate == Fate.DETECTED)
+    points[landed, ends.bounces[landed] + 1] = ends.origin[landed]
+    local = np.where(triangle >= 0, triangle - plan.engine.offset[surface], -1)
+    return {"surface": surface, "triangle": local, "points": points}
