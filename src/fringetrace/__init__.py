@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fringetrace.bounds import Bounds, bounds
 from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
-from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.interfaces import Absorber, BeamSplitter, Dielectric, Metal, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -22,7 +22,7 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import films, forms, instruments, materials, meshes, phase, shapes, vectors, views
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -32,11 +32,13 @@ __all__ = [
     "BeamSplitter",
     "Bounds",
     "Budget",
+    "Dielectric",
     "Fate",
     "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
+    "Metal",
     "Mirror",
     "Paths",
     "Rays",
@@ -46,9 +48,11 @@ __all__ = [
     "budget",
     "complex_field",
     "degree",
+    "films",
     "forms",
     "instruments",
     "irradiance",
+    "materials",
     "meshes",
     "mm",
     "mutual_intensity",
@@ -63,7 +67,7 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = ("films", "forms", "instruments", "materials", "meshes", "phase", "shapes", "vectors", "views")
 
 
 def __getattr__(name: str) -> Any:
