@@ -22,7 +22,7 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import films, forms, instruments, materials, meshes, phase, shapes, vectors, views
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -46,9 +46,11 @@ __all__ = [
     "budget",
     "complex_field",
     "degree",
+    "films",
     "forms",
     "instruments",
     "irradiance",
+    "materials",
     "meshes",
     "mm",
     "mutual_intensity",
@@ -63,7 +65,7 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = ("films", "forms", "instruments", "materials", "meshes", "phase", "shapes", "vectors", "views")
 
 
 def __getattr__(name: str) -> Any:
