@@ -36,12 +36,25 @@ class Material:
         The imaginary part, 0 or more; None: transparent.
     source : str
         Where the numbers were published.
+
+    Raises
+    ------
+    ValueError
+        If n and kappa are known at no common wavelength.
     """
 
     name: str
     n: Curve
     kappa: Curve | None = None
     source: str = ""
+
+    def __post_init__(self) -> None:
+        if self.range is not None and self.range[0] > self.range[1]:
+            assert self.kappa is not None
+            raise ValueError(
+                f"{self.name}: expected n and kappa over common wavelengths, "
+                f"got {self.n.range} um and {self.kappa.range} um"
+            )
 
     @property
     def dispersive(self) -> bool:
