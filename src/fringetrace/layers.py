@@ -11,7 +11,7 @@ from fringetrace.exact import jit
 
 @jit
 def normal(index, sine2):
-    """Kz / k0 = sqrt(n^2 - sine2) of the wave that goes on: Im > 0, or Re > 0 where it is real.
+    """Normal part kz / k0 = sqrt(n^2 - sine2) of the wave that goes on: Im > 0, or Re > 0 where it is real.
 
     Waves that come out of an absorbing medium may grow along z, as they are damped along x: there
     the branch with Re + Im > 0 is the one that goes on into that of a transparent medium.
@@ -90,7 +90,7 @@ def carried(sine2, first, last):
 
 @jit
 def stacks(sine2, first, layers, thickness, last, k0):
-    """`stack` for arrays (k,) of `sine2`, `first`, `last` and `k0`, and `layers` (k, m): (4, k) amplitudes."""
+    """`stack` for arrays (k,) of sine2, first, last, k0, and (k, m) of layers: (4, k) amplitudes."""
     out = np.empty((4, len(sine2)), np.complex128)
     for i in range(len(sine2)):
         out[0, i], out[1, i], out[2, i], out[3, i] = stack(
