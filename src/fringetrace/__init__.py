@@ -22,7 +22,20 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import (
+        crystals,
+        elements,
+        forms,
+        gratings,
+        instruments,
+        meshes,
+        phase,
+        plates,
+        polarisers,
+        shapes,
+        vectors,
+        views,
+    )
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -45,8 +58,11 @@ __all__ = [
     "bounds",
     "budget",
     "complex_field",
+    "crystals",
     "degree",
+    "elements",
     "forms",
+    "gratings",
     "instruments",
     "irradiance",
     "meshes",
@@ -54,6 +70,8 @@ __all__ = [
     "mutual_intensity",
     "nm",
     "phase",
+    "plates",
+    "polarisers",
     "shapes",
     "stream",
     "trace",
@@ -63,7 +81,10 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = (
+    "crystals", "elements", "forms", "gratings", "instruments", "meshes", "phase", "plates", "polarisers",
+    "shapes", "vectors", "views",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

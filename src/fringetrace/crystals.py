@@ -25,6 +25,7 @@ from fringetrace.elements import (
     checked_number,
     dot,
     index_at,
+    lying,
     scaled,
     shifted,
     turned,
@@ -243,11 +244,10 @@ class Wollaston:
         """The beam polarised along the axis, and the one across; see `Element`."""
         n_o = index_at(self.ordinary, meeting.wavelength, "Wollaston")
         n_e = index_at(self.extraordinary, meeting.wavelength, "Wollaston")
-        slope = across(self.axis, meeting.normal)
+        slope = lying(self.axis, meeting.normal, "Wollaston axis")
         along, rest = split(meeting, slope, "Wollaston")
-        return self._beam(meeting, along, slope, n_o, n_e, True), self._beam(
-            meeting, rest, slope, n_o, n_e, False
-        )
+        one = self._beam(meeting, along, slope, n_o, n_e, True)
+        return one, self._beam(meeting, rest, slope, n_o, n_e, False)
 
     def _beam(
         self, meeting: Meeting, field: ComplexArray, slope: FloatArray, n_o: float, n_e: float, first: bool

@@ -184,6 +184,14 @@ def across(axis: FloatArray, direction: FloatArray) -> FloatArray:
     return np.where(seen[:, None], part / np.where(seen, size, 1.0)[:, None], 0.0)
 
 
+def lying(axis: FloatArray, normal: FloatArray, what: str) -> FloatArray:
+    """An axis as it lies in surfaces, (n, 3) unit; ValueError if it stands on one of them."""
+    lie = across(axis, normal)
+    if not lie.any(axis=1).all():
+        raise ValueError(f"{what}: expected a direction along the surface, got its normal {axis.tolist()}")
+    return lie
+
+
 def carried(field: ComplexArray, before: FloatArray, after: FloatArray) -> ComplexArray:
     """Fields of rays that are bent, turned by the least rotation that takes one direction to the other.
 

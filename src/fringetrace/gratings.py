@@ -23,12 +23,13 @@ from fringetrace.elements import (
     bent,
     checked_length,
     dot,
+    lying,
     scaled,
     sent,
     shifted,
     turned,
 )
-from fringetrace.vectors import checked_direction, checked_vector, component
+from fringetrace.vectors import checked_direction, checked_vector
 from fringetrace.waves import FloatArray
 
 # Orders may not carry more power than came; rounding is allowed for.
@@ -113,9 +114,7 @@ class Grating:
     def act(self, meeting: Meeting) -> tuple[Branch, ...]:
         """The orders; see `Element`."""
         assert self.amplitudes is not None
-        # the axis as it lies in the surface, scaled to unit length
-        lie = self.axis - scaled(meeting.normal, component(meeting.normal, self.axis))
-        lie = scaled(lie, 1.0 / np.sqrt(dot(lie, lie)))
+        lie = lying(self.axis, meeting.normal, "Grating axis")
         along = dot(meeting.point - self.centre, lie)
         step = asked(meeting.wavelength, "Grating") / self.period
         return tuple(
