@@ -22,7 +22,22 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import films, forms, instruments, materials, meshes, phase, shapes, vectors, views
+    from fringetrace import (
+        crystals,
+        elements,
+        films,
+        forms,
+        gratings,
+        instruments,
+        materials,
+        meshes,
+        phase,
+        plates,
+        polarisers,
+        shapes,
+        vectors,
+        views,
+    )
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -47,9 +62,12 @@ __all__ = [
     "bounds",
     "budget",
     "complex_field",
+    "crystals",
     "degree",
+    "elements",
     "films",
     "forms",
+    "gratings",
     "instruments",
     "irradiance",
     "materials",
@@ -58,6 +76,8 @@ __all__ = [
     "mutual_intensity",
     "nm",
     "phase",
+    "plates",
+    "polarisers",
     "shapes",
     "stream",
     "trace",
@@ -67,7 +87,10 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("films", "forms", "instruments", "materials", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = (
+    "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes", "phase",
+    "plates", "polarisers", "shapes", "vectors", "views",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.elements import Branch, Element, Meeting
-from fringetrace.media import Optics
 from fringetrace.passes import Chunk, Plan, Record, Workspace, nearest
 from fringetrace.rays import Batch, Carried, Ends, grown, start
 from fringetrace.waves import Array, ComplexArray, FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.elements import Branch, Element
+    from fringetrace.media import Optics
 
 # As in `screens`.
 ABSORBED, FAINT, ALIVE = 2, 4, 5
@@ -152,6 +155,8 @@ def _power(field: ComplexArray) -> FloatArray:
 
 def _act(plan: Plan, state: _State, number: int, element: Element, record: Record | None) -> None:
     """Send the rays that stand at a thin element through it."""
+    from fringetrace.elements import Meeting
+
     batch, optics = state.batch, plan.matter
     assert optics is not None
     surface = plan.engine.owner[batch.last[: state.count]]

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.elements import Element
 from fringetrace.interfaces import Dielectric, Metal
 from fringetrace.materials import Material
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import Scene, Surface
 from fringetrace.waves import Array, ComplexArray, checked_wavelength
+
+if TYPE_CHECKING:
+    from fringetrace.elements import Element
 
 # As in `refractions`, which takes a second to load.
 CONSTANT, BOUNDARY = 0, 1
@@ -205,7 +207,7 @@ def thin(scene: Scene) -> dict[int, Element]:
     dict of int to Element
     """
     acting = ((i, surface.interface) for i, surface in enumerate(scene.surfaces))
-    return {i: cast(Element, interface) for i, interface in acting if hasattr(interface, "act")}
+    return {i: cast("Element", interface) for i, interface in acting if hasattr(interface, "act")}
 
 
 def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:

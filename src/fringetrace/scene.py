@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.elements import Element
 from fringetrace.interfaces import Dielectric, Interface, Metal
 from fringetrace.materials import VACUUM, Material, as_material
 from fringetrace.mesh import Mesh, as_mesh
@@ -18,6 +17,7 @@ from fringetrace.vectors import checked_direction, checked_vector, frame
 from fringetrace.waves import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
+    from fringetrace.elements import Element
     from fringetrace.forms import Form
 
 

@@ -1,4 +1,4 @@
-"""Thin films: soap, MgF2, quarter-wave mirrors, the scales of Morpho; beside Airy's sum and the program tmm."""
+"""Thin films: soap, MgF2, quarter-wave mirrors, scales of Morpho; beside Airy's sum and the program tmm."""
 
 import cmath
 import math
@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from fringetrace import films, materials, nm
 from fringetrace.films import Film
+from fringetrace.layers import stack
 from fringetrace.waves import degree
 
 EPS = float(np.finfo(np.float64).eps)
@@ -177,8 +178,8 @@ def test_light_sent_back_meets_the_incident_wave():
     film = Film([(2.3, 70 * nm), (1.38, 110 * nm), (1.8, 40 * nm)])
     sine2 = complex(0.6**2)
     n, d = film.indices(550 * nm), film.thickness
-    there = films.stack(sine2, 1 + 0j, n, d, 1.52 + 0j, 2 * math.pi / (550 * nm))
-    back = films.stack(sine2, 1.52 + 0j, n[::-1].copy(), d[::-1].copy(), 1 + 0j, 2 * math.pi / (550 * nm))
+    there = stack(sine2, 1 + 0j, n, d, 1.52 + 0j, 2 * math.pi / (550 * nm))
+    back = stack(sine2, 1.52 + 0j, n[::-1].copy(), d[::-1].copy(), 1 + 0j, 2 * math.pi / (550 * nm))
     for part in (0, 1):
         r, t, behind = there[part], there[2 + part], back[part]
         assert abs(r.conjugate() * t + t.conjugate() * behind) < 20 * EPS
@@ -189,7 +190,7 @@ def test_a_layer_at_its_critical_angle():
     film = Film([(1.5, 80 * nm)])
     n, d, k0 = film.indices(550 * nm), film.thickness, 2 * math.pi / (550 * nm)
     at, below, above = (
-        np.array(films.stack(complex(2.25 * (1 + shift)), 2 + 0j, n, d, 1.8 + 0j, k0))
+        np.array(stack(complex(2.25 * (1 + shift)), 2 + 0j, n, d, 1.8 + 0j, k0))
         for shift in (0.0, -1e-6, 1e-6)
     )
     assert np.isfinite(at).all()
