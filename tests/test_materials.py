@@ -25,7 +25,8 @@ PUBLISHED = [  # index, its last printed digit
     (m.GOLD, 633 * nm, 0.18344 + 3.43324j, 1e-5),  # between two of Johnson and Christy's
     (m.SILVER, 548.6 * nm, 0.06 + 3.586j, 1e-12), (m.ALUMINIUM, 563.57 * nm, 1.0728 + 6.7839j, 1e-12),
     (m.CHITIN, 400 * nm, 1.572, 1e-3), (m.CHITIN, 500 * nm, 1.552, 1e-3), (m.CHITIN, 600 * nm, 1.541, 1e-3),
-    (m.KERATIN, 400 * nm, 1.569, 1e-3), (m.KERATIN, 500 * nm, 1.556, 1e-3), (m.KERATIN, 600 * nm, 1.548, 1e-3),
+    (m.KERATIN, 400 * nm, 1.569, 1e-3), (m.KERATIN, 500 * nm, 1.556, 1e-3),
+    (m.KERATIN, 600 * nm, 1.548, 1e-3),
 ]  # fmt: skip
 
 TISSUE = [  # nm, chitin, keratin, melanin
