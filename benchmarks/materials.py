@@ -12,7 +12,7 @@ LINES = (486.13, 589.3, 656.27)
 
 
 def index(material: Material, wavelength: float) -> str:
-    """N + i kappa with five decimals."""
+    """Index n + i kappa with five decimals."""
     value = material.index(wavelength * nm)
     return f"{value.real:.5f}" + (f" + {value.imag:.5f} i" if value.imag else "")
 

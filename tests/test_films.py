@@ -1,4 +1,4 @@
-"""Films: what they hold, shapes of what comes out, what is refused. Physics: physics/test_thin_films.py."""
+"""Films: what they hold, shapes of what comes out, and what is refused."""
 
 import math
 import pickle

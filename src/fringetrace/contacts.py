@@ -118,14 +118,14 @@ def indices(paths: Paths) -> FloatArray:
     known = {m: complex(m.index(paths.wavelength or 1.0)).real for m in materials(paths.scene)}
     direction = np.asarray(legs(paths)[1], dtype=np.float64)
     index[:] = np.nan
-    index[:, 0] = known[paths.scene.medium]
+    index[:, 0] = known[paths.scene.around]
     for bounces in met(paths):
         surface = bounces.surface
         if not surface.boundary:
             continue
         onward = direction[bounces.path, bounces.bounce + 1]
         front = np.einsum("ni,ni->n", facing(bounces), onward) > 0.0
-        before, behind = (known[side or paths.scene.medium] for side in (surface.front, surface.back))
+        before, behind = (known[side or paths.scene.around] for side in (surface.front, surface.back))
         index[bounces.path, bounces.bounce + 1] = np.where(front, before, behind)
     # as it was, where no boundary changed it
     latest = np.maximum.accumulate(np.where(np.isnan(index), 0, np.arange(index.shape[1])), axis=1)

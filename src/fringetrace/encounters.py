@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.passes import Chunk, Plan, Record, Workspace, nearest
-from fringetrace.rays import Batch, Carried, Ends, grown, start
+from fringetrace.rays import Batch, Carried, Ends, Rays, grown, start
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def traverse(plan: Plan, space: Workspace, first: int, stop: int) -> Chunk:
     rays = plan.rays(first, stop)
     state = _begun(plan, space, len(rays))
     start(state.batch, rays, first)
-    _fill(state.carried, len(rays), optics, rays.polarisation)
+    _fill(state.carried, rays, optics)
     record = Record(rays.origin) if plan.record else None
     limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
     segments, doubtful, passed = 0, 0, plan.passed
@@ -116,15 +116,16 @@ def _begun(plan: Plan, space: Workspace, count: int) -> _State:
     return state
 
 
-def _fill(carried: Carried, count: int, optics: Optics, polarisation: ComplexArray | None) -> None:
+def _fill(carried: Carried, rays: Rays, optics: Optics) -> None:
     """Rays at their start, in the scene's medium."""
+    count = len(rays)
     carried.medium[:count], carried.index[:count] = 0, optics.media[0].real
     carried.lengths[:count], carried.dropped[:count], carried.bend[:count] = 0.0, 0.0, 0.0
     if optics.fading:
-        carried.fade[:count] = 0.0
+        carried.fade[:count] = optics.media[0].imag * rays.direction
     if optics.polarised:
-        assert polarisation is not None
-        carried.field[:count] = polarisation
+        assert rays.polarisation is not None
+        carried.field[:count] = rays.polarisation
 
 
 def _meet(plan: Plan, state: _State, record: Record | None) -> None:

@@ -101,7 +101,7 @@ def contradicted(paths: Paths) -> str | None:
         return None
     worst = int(np.argmax(paths.contradictions))
     surface, number = paths.scene.surfaces[worst], int(paths.contradictions[worst])
-    sides = " and ".join((side or paths.scene.medium).name for side in (surface.front, surface.back))
+    sides = " and ".join((side or paths.scene.around).name for side in (surface.front, surface.back))
     return (
         f"media contradict: {number:,} rays came to {surface.name!r}, between {sides} (front and back), in "
         f"another medium; close its mesh, turn its normals to the front, name the media of what lies "

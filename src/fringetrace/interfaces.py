@@ -6,12 +6,14 @@ import cmath
 import math
 from dataclasses import dataclass
 from numbers import Complex, Real
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from fringetrace.films import Film
 from fringetrace.waves import FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.films import Film
 
 # A passive surface may not send on more power than it got; rounding is allowed for.
 PASSIVE = 1.0 + 1e-12
@@ -123,7 +125,11 @@ FOLLOWED = ("both", "reflected", "transmitted")
 
 
 def _checked_film(film: Film | None, what: str) -> None:
-    if film is not None and not isinstance(film, Film):
+    if film is None:
+        return
+    from fringetrace.films import Film
+
+    if not isinstance(film, Film):
         raise TypeError(f"{what} film: expected None or a Film, got {film!r}")
 
 

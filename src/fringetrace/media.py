@@ -10,13 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.interfaces import Dielectric, Metal
-from fringetrace.materials import Material
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import Scene, Surface
 from fringetrace.waves import Array, ComplexArray, checked_wavelength
 
 if TYPE_CHECKING:
     from fringetrace.elements import Element
+    from fringetrace.indices import Material
 
 # As in `refractions`, which takes a second to load.
 CONSTANT, BOUNDARY = 0, 1
@@ -88,7 +88,7 @@ def materials(scene: Scene) -> tuple[Material, ...]:
     -------
     tuple of Material
     """
-    found = [scene.medium]
+    found = [scene.around]
     for surface in scene.surfaces:
         found += [medium for medium in (surface.front, surface.back) if medium is not None]
     return tuple(dict.fromkeys(found))
@@ -112,8 +112,10 @@ def plain(scene: Scene, polarised: bool) -> bool:
     bool
     """
     acting = any(surface.boundary or hasattr(surface.interface, "act") for surface in scene.surfaces)
-    medium = scene.medium
-    return not (acting or polarised or medium.dispersive or complex(medium.index(1.0)) != 1.0)
+    if acting or polarised:
+        return False
+    around = scene.medium
+    return around is None or not (around.dispersive or complex(around.index(1.0)) != 1.0)
 
 
 def needs(scene: Scene) -> str | None:
@@ -176,7 +178,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
     known = materials(scene)
     at = 1.0 if wavelength is None else wavelength
     numbers = {medium: number for number, medium in enumerate(known)}
-    sides = [[s.front or scene.medium, s.back or scene.medium] for s in scene.surfaces]
+    sides = [[s.front or scene.around, s.back or scene.around] for s in scene.surfaces]
     table = np.array([[numbers[medium] for medium in side] for side in sides], dtype=np.int32)
     reflection, transmission = constants(scene)
     return Optics(
@@ -303,12 +305,12 @@ def _ratio(paths: Paths, wavelength: float) -> ComplexArray:
     keys, first, which = np.unique(paths.key, return_index=True, return_inverse=True)
     ratio = np.ones(len(keys), dtype=np.complex128)
     for number, row in enumerate(first):
-        medium = paths.scene.medium
+        medium = paths.scene.around
         for name, through in paths.sequence(int(row)):
             surface = paths.scene.surfaces[name]
             if surface.boundary:
-                new, beyond = _straight_on(surface, medium, paths.scene.medium, wavelength, through)
-                old, _ = _straight_on(surface, medium, paths.scene.medium, paths.wavelength, through)
+                new, beyond = _straight_on(surface, medium, paths.scene.around, wavelength, through)
+                old, _ = _straight_on(surface, medium, paths.scene.around, paths.wavelength, through)
                 ratio[number] *= new / old
                 medium = beyond
     return np.asarray(ratio[which], dtype=np.complex128)

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.interfaces import Dielectric, Interface, Metal
-from fringetrace.materials import VACUUM, Material, as_material
 from fringetrace.mesh import Mesh, as_mesh
 from fringetrace.vectors import checked_direction, checked_vector, frame
 from fringetrace.waves import ComplexArray, FloatArray
@@ -19,6 +18,15 @@ from fringetrace.waves import ComplexArray, FloatArray
 if TYPE_CHECKING:
     from fringetrace.elements import Element
     from fringetrace.forms import Form
+    from fringetrace.indices import Material
+
+
+def _medium(value: Any, what: str) -> Material | None:
+    if value is None:
+        return None
+    from fringetrace.materials import as_material
+
+    return as_material(value, what)
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,8 +80,7 @@ class Surface:
 
     def _check_media(self) -> None:
         for side in ("front", "back"):
-            if getattr(self, side) is not None:
-                object.__setattr__(self, side, as_material(getattr(self, side)))
+            object.__setattr__(self, side, _medium(getattr(self, side), f"{self.name} {side}"))
         given = [side for side in ("front", "back") if getattr(self, side) is not None]
         kind = type(self.interface).__name__
         if given and not self.boundary:
@@ -291,8 +298,8 @@ class Scene:
     Parameters
     ----------
     surfaces : iterable of Surface
-    medium : Material, or number, or name of a material
-        What is around them, where beams start.
+    medium : Material, or number, or name of a material, optional
+        What is around them, where beams start; None: a vacuum.
 
     Raises
     ------
@@ -303,7 +310,7 @@ class Scene:
     """
 
     surfaces: tuple[Surface, ...]
-    medium: Material = VACUUM
+    medium: Material | None = None
     # what rooms above have derived from the surfaces (the engine's bodies), kept with them
     derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -315,10 +322,19 @@ class Scene:
         if not surfaces:
             raise ValueError("Scene: expected at least one Surface, got none")
         object.__setattr__(self, "surfaces", surfaces)
-        object.__setattr__(self, "medium", as_material(self.medium))
+        object.__setattr__(self, "medium", _medium(self.medium, "Scene medium"))
 
     def __getstate__(self) -> dict[str, Any]:
         return {**vars(self), "derived": {}}
+
+    @property
+    def around(self) -> Material:
+        """The medium around the surfaces."""
+        if self.medium is not None:
+            return self.medium
+        from fringetrace.materials import VACUUM
+
+        return VACUUM
 
     @property
     def digits(self) -> tuple[tuple[int, bool], ...]:

@@ -1,4 +1,4 @@
-"""Thin films: soap, MgF2, quarter-wave mirrors, scales of Morpho; beside Airy's sum and the program tmm."""
+"""Thin films: soap, MgF2, quarter-wave mirrors, the scales of Morpho; beside Airy's sum and tmm."""
 
 import cmath
 import math
