@@ -291,7 +291,7 @@ def _say(console: Console, what: str, text: str) -> None:
 
 
 def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength: float) -> None:
-    from fringetrace.bench import path_slope
+    from fringetrace.arms import path_slope
 
     rows, columns = bench.ccd.shape
     width, height = bench.ccd.size

@@ -226,14 +226,30 @@ class Paths:
         count = len(self.scene.surfaces)
         if not 0 <= surface < count:
             raise ValueError(f"visits surface: expected a number from 0 to {count - 1}, got {surface}")
+        digits, which = self.kinds()
+        mine = [number for number, (there, _) in enumerate(self.scene.digits, start=1) if there == surface]
+        return np.asarray(np.isin(digits, mine).sum(axis=1)[which], dtype=np.int64)
+
+    def kinds(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """The sequences among the paths (decoded from their keys), and which of them each path took.
+
+        Returns
+        -------
+        digits : (kinds, b) int64
+            For each bounce the number, from 1 on, of surface and branch in `Scene.digits`; padded with -1.
+        which : (m,) int64
+
+        Raises
+        ------
+        ValueError
+            If a path has too many bounces for its key to tell.
+        """
         # digits are never 0: equal keys mean equal numbers of bounces
         kinds = np.unique(self.key)
         which = np.searchsorted(kinds, self.key)
         bounces = np.zeros(len(kinds), dtype=np.int64)
         bounces[which] = self.bounces
-        digits = self._digits(kinds, bounces)
-        mine = [number for number, (there, _) in enumerate(self.scene.digits, start=1) if there == surface]
-        return np.asarray(np.isin(digits, mine).sum(axis=1)[which], dtype=np.int64)
+        return self._digits(kinds, bounces), which
 
     def _row(self, row: int, what: str) -> int:
         """A row counted from the start; a negative one is counted from the end."""
