@@ -195,8 +195,8 @@ class Bench(Rig):
         Returns
         -------
         (rows, columns) float64, metres
-            Up to a whole number of wavelengths; NaN where either arm brings no light. Between neighbouring pixels
-            it must change by less than wavelength / 2.
+            Up to a constant; NaN where either arm brings no light. It must change by less than
+            wavelength / 2 between neighbouring pixels.
 
         Raises
         ------

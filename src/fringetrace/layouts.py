@@ -1,4 +1,4 @@
-"""What benches have in common: checked numbers, rays and pixels, turned plates, samples that light goes through."""
+"""What benches have in common: checked numbers, rays and pixels, turned plates, transparent samples."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from fringetrace.indices import Material
 from fringetrace.interfaces import Dielectric
 from fringetrace.mesh import Mesh, as_mesh
 from fringetrace.pupils import Pupil
@@ -90,6 +91,13 @@ def leaning(tilt: tuple[float, float]) -> FloatArray:
     return np.array([scale * tilt[0], scale * tilt[1], math.cos(angle)])
 
 
+def surrounding(medium: Material | complex | str | None) -> Material | None:
+    """The medium around a bench, from what stands for one; None: a vacuum."""
+    from fringetrace.materials import as_material
+
+    return None if medium is None else as_material(medium, "medium")
+
+
 def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...]:
     """The surfaces of a sample that light goes through.
 
@@ -116,7 +124,9 @@ def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...
         sample = (sample,)
     if isinstance(sample, (list, tuple)):
         if index is not None:
-            raise ValueError(f"{bench} index: expected None beside surfaces, which name their media, got {index!r}")
+            raise ValueError(
+                f"{bench} index: expected None beside surfaces, which name their media, got {index!r}"
+            )
         return tuple(sample)
     mesh = as_mesh(sample, "sample")
     if index is None:

@@ -1,8 +1,8 @@
 """Light of several wavelengths: spectra, spectral lines, and how far they stay coherent.
 
-Wavelengths do not interfere with each other: what a camera records is the sum over them. The complex degree of
-coherence between two waves whose paths differ by D is g(D) = sum of w exp(2 pi i D / wavelength) over a
-spectrum of weights w that add up to 1.
+Wavelengths do not interfere with each other: what a camera records is the sum over them. The complex
+degree of coherence between two waves whose paths differ by D is g(D) = sum of w exp(2 pi i D / wavelength)
+over a spectrum of weights w that add up to 1.
 """
 
 from __future__ import annotations
@@ -105,7 +105,8 @@ class Line:
         wide = isinstance(self.width, Real) and math.isfinite(self.width) and self.width > 0.0
         if not wide or _reach(ERROR) * self.spread * self.centre >= 1.0:
             raise ValueError(
-                f"Line width: expected a positive length, a part of {self.centre / nm:g} nm, got {self.width!r} m"
+                f"Line width: expected a positive length, a part of {self.centre / nm:g} nm, "
+                f"got {self.width!r} m"
             )
 
     @property
@@ -159,8 +160,8 @@ class Line:
         count = math.ceil(reach / step)
         if 2 * count + 1 > MOST:
             raise ValueError(
-                f"Line: expected at most {MOST} wavelengths, got {2 * count + 1} for paths that differ by {path:g} m; "
-                f"it is coherent over {self.length:g} m: give a Spectrum of your own"
+                f"Line: expected at most {MOST} wavelengths, got {2 * count + 1} for paths that differ by "
+                f"{path:g} m; it is coherent over {self.length:g} m: give a Spectrum of your own"
             )
         offset = np.arange(-count, count + 1) * step
         wavelengths = np.asarray(1.0 / (1.0 / self.centre + offset), dtype=np.float64)

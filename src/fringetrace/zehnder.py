@@ -42,8 +42,8 @@ def mach_zehnder(
     """A Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
 
     Light goes through the sample along +z; the camera looks back at it, its columns along x and its rows
-    along y, focused on a plane inside of the sample: rays are carried back to it along the lines on which they
-    left (`CCD.focus`). Both arms are equally long without the sample. All of it stands in the medium.
+    along y, focused on a plane inside of the sample: rays are carried back to it along the lines on which
+    they left (`CCD.focus`). Both arms are equally long without the sample. All of it stands in the medium.
 
     Parameters
     ----------
@@ -93,13 +93,14 @@ def mach_zehnder(
     """
     size = layouts.checked_image("mach_zehnder", aperture, pixels, rays)
     layouts.checked_tilt("mach_zehnder", reference_tilt)
+    around = layouts.surrounding(medium)
     surfaces = layouts.transparent("mach_zehnder", sample, index)
     aside, deep = layouts.extent(surfaces, max(size))
     stop = 1.1 * max(deep, abs(plane)) + 0.25 * max(size)
     arm = 4.0 * max(stop, aside)
     chip = 7.0 * (arm + aside)
     small = plate(4.0 * aside, 4.0 * aside)
-    pupil = layouts.pupil("mach_zehnder", Scene(surfaces, medium), na, design)
+    pupil = layouts.pupil("mach_zehnder", Scene(surfaces, around), na, design)
     turn = layouts.standing(DIAGONAL)
     scene = Scene(
         (
@@ -110,16 +111,16 @@ def mach_zehnder(
             Surface(plate(100.0 * arm, 100.0 * arm).moved((0.0, 0.0, stop)), pupil, "pupil"),
             _last(arm, aside, splitter),
         ),
-        medium,
+        around,
     )
+    x, y, z = np.eye(3)
     beam = Beam(
-        centre=np.array([-arm, 0.0, -2.0 * arm]), direction=np.array([0.0, 0.0, 1.0]), up=np.array([0.0, 1.0, 0.0]),
+        centre=-arm * x - 2.0 * arm * z, direction=z, up=y,
         size=size, shape=layouts.ray_grid(pixels, rays), profile=layouts.seen(profile),
         polarisation=None if polarisation is None else np.array([-polarisation[0], polarisation[1]]),
     )  # fmt: skip
     ccd = CCD(
-        centre=np.array([0.0, 0.0, chip]), normal=np.array([0.0, 0.0, -1.0]), up=np.array([0.0, 1.0, 0.0]),
-        pitch=aperture / pixels[1], shape=pixels, focus=chip - plane,
+        centre=chip * z, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels, focus=chip - plane,
     )  # fmt: skip
     return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, immersion=scene.medium)
 
@@ -146,4 +147,6 @@ def _last(arm: float, aside: float, splitter: Interface) -> Surface:
     middle = 0.5 * (low + high)
     across = 2.0 * (1.5 * (arm + aside) + aside)
     mesh = plate(math.sqrt(2.0) * (high - low), across)
-    return Surface(mesh.moved((middle - arm, 0.0, middle), layouts.standing(DIAGONAL)), splitter, "second splitter")
+    return Surface(
+        mesh.moved((middle - arm, 0.0, middle), layouts.standing(DIAGONAL)), splitter, "second splitter"
+    )
