@@ -34,7 +34,8 @@ def visibility(bench, light):
     ("path", "coherence"), [(0.0, 1.0), (10 * um, 0.677725811), (13.348454 * um, 0.5), (20 * um, 0.210967766)]
 )
 def test_a_line_of_ten_nanometres(path, coherence):
-    assert abs(GREEN.coherence(path)) == pytest.approx(coherence, abs=5e-8 if path == GREEN.length else 3e-8)
+    # the printed paths have so many digits
+    assert abs(GREEN.coherence(path)) == pytest.approx(coherence, abs=3e-8)
     assert visibility(michelson(0.5 * path), GREEN) == pytest.approx(coherence, abs=ERROR)
 
 
