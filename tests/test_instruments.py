@@ -223,8 +223,9 @@ def test_what_does_not_fit_other_benches_is_refused(bench, options, message):
 @pytest.mark.parametrize("bench", ["mach_zehnder", "jamin_lebedeff"])
 def test_a_profile_is_given_over_the_image_of_every_bench(bench):
     """Light only where x > 0 and y < 0."""
+    slab = plate(8 * mm, 8 * mm, 1 * mm).moved((0.0, 0.0, 0.5 * mm))
     instrument = getattr(instruments, bench)(
-        plate(8 * mm, 8 * mm, 1 * mm).moved((0.0, 0.0, 0.5 * mm)), index=1.0, aperture=APERTURE, pixels=(6, 8),
+        slab, index=1.0, aperture=APERTURE, pixels=(6, 8),
         profile=lambda x, y: np.where((x > 0) & (y < 0), 1.0, 0.0),
     )  # fmt: skip
     expected = np.zeros((6, 8))

@@ -152,7 +152,7 @@ def _arm(size: tuple[float, float], arm: float | None, top: float, thick: Splitt
     arm = max(shortest, TALLEST * top) if arm is None else arm
     if not (math.isfinite(arm) and arm >= shortest):
         raise ValueError(
-            f"michelson arm: expected at least {shortest / max(size):.1f} times the aperture, {shortest:g} m, "
+            f"michelson arm: expected at least {shortest / max(size)} times the aperture, {shortest:g} m, "
             f"got {arm!r}"
         )
     if not arm >= TALLEST * top:

@@ -123,7 +123,7 @@ def jamin_lebedeff(
         ),
         space.medium,
     )
-    x, y, z = np.eye(3)
+    _, y, z = np.eye(3)
     beam = Beam(
         centre=-4.0 * stop * z, direction=z, up=y, size=size, shape=layouts.ray_grid(pixels, rays),
         profile=layouts.seen(profile), polarisation=np.array([-math.cos(HALFWAY), math.sin(HALFWAY)]),

@@ -1,4 +1,4 @@
-"""White light and lines in a Michelson: visibility by the degree of coherence, beats, glass without compensator."""
+"""White light and lines in a Michelson: degree of coherence, beats, glass with and without compensator."""
 
 import math
 
@@ -103,7 +103,7 @@ def test_a_splitter_of_glass_adds_two_crossings_that_a_compensator_takes_away(co
 
 @pytest.mark.parametrize("compensator", [False, True])
 def test_dispersion_takes_the_fringes_of_white_light(compensator):
-    """Paths made equal for the middle of a line: the group's path is not, and the line's fringes fade with it."""
+    """Paths made equal for the middle of a line: the group's path is not, and the fringes fade."""
     depth, line = 1 * mm, Line(550 * nm, 5 * nm)
     n = BK7.index(line.centre).real
     added = 0.0 if compensator else depth * (math.sqrt(n * n - 0.5) - math.sqrt(0.5))

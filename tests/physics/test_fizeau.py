@@ -35,7 +35,7 @@ def airy(r, phase):
 
 @pytest.mark.parametrize(("waves", "power"), [(0.0, 0.0), (0.125, 0.079872204), (0.25, 0.147928994)])
 def test_a_gap_between_two_glass_plates(waves, power):
-    """|r (1 - exp(2ib)) / (1 - r^2 exp(2ib))|^2, b = 2 pi gap / lambda; r^18 is what 8 round trips leave out."""
+    """|r (1 - exp(2ib)) / (1 - r^2 exp(2ib))|^2, b = 2 pi gap / lambda; trips left out bring r^15."""
     bench = instruments.fizeau(
         glass_plate(), aperture=1 * mm, gap=(1000 + waves) * HENE, pixels=(4, 4), min_amplitude=0.0
     )
@@ -157,7 +157,7 @@ def test_a_wedged_plate_leads_its_ghost_aside():
 
 
 def test_the_camera_sees_the_sample_through_the_plate():
-    """A facet tilted at one place: its light comes from where it stands, up to the third order of its angle."""
+    """A tilted sample: its light comes from where it stands, up to the third order of its angle."""
     slope = 0.01
     tilted = plate(8 * mm, 8 * mm).moved(turn=ft.vectors.rotation((0, 1, 0), -slope))
     bench = instruments.fizeau(tilted, aperture=1 * mm, gap=0.1 * mm, thickness=3 * mm, pixels=(1, 9))

@@ -1,4 +1,4 @@
-"""A Jamin-Lebedeff bench: the analyser's law, Senarmont, leaks, and the index of chitin from a measurement."""
+"""A Jamin-Lebedeff bench: the analyser's law, Senarmont, leaks, the index of chitin measured."""
 
 import math
 

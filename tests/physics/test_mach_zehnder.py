@@ -1,11 +1,11 @@
-"""A Mach-Zehnder bench against closed forms (slab, wedge, cylinder, ball), and against the waves in a cylinder."""
+"""A Mach-Zehnder bench against closed forms (slab, wedge, cylinder, ball), and waves in a cylinder."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import h1vp, hankel1, jv, jvp
+from imaged import refocused, waves
 
 import fringetrace as ft
 from fringetrace import Dielectric, Surface, forms, instruments, mm, nm, um
@@ -89,17 +89,6 @@ def test_a_wedge_turns_light_by_its_exact_angle():
     np.testing.assert_allclose(angle, 0.025039156767523857, rtol=0, atol=1e-15)
 
 
-def refocused(height, radius):
-    """Image position and added path of a ray through a cylinder or ball, carried back to its middle."""
-    i = np.arcsin(height / radius)
-    r = np.arcsin(WATER * height / (CELL * radius))
-    chord, bend = 2 * radius * np.cos(r), r - i
-    # along the chord, turned by r - i, and out at twice that
-    x, z = height + chord * np.sin(bend), -radius * np.cos(i) + chord * np.cos(bend)
-    on = -z / np.cos(2 * bend)
-    return x + on * np.sin(2 * bend), CELL * chord + WATER * (on - radius * np.cos(i))
-
-
 def rod(radius):
     angle = np.linspace(0.0, 2 * np.pi, 361)[:-1]
     mesh = extrude(radius * np.stack([np.cos(angle), np.sin(angle)], axis=1), 4 * radius, closed=True)
@@ -128,7 +117,10 @@ def test_a_refocused_cylinder_and_a_ball(sample):
         (middle.length - reference) / um, [path for _, path in table.values()], rtol=0, atol=NINE
     )
     for height, (place, path) in table.items():
-        assert refocused(height, 10.0) == (pytest.approx(place, abs=NINE), pytest.approx(path, abs=NINE))
+        assert refocused(height, 10.0, CELL, WATER) == (
+            pytest.approx(place, abs=NINE),
+            pytest.approx(path, abs=NINE),
+        )
 
 
 def test_facets_err_by_their_sag():
@@ -141,33 +133,12 @@ def test_facets_err_by_their_sag():
         rays, reference = arms(ball)
         at = (rays.pixel - 12) * ball.ccd.pitch
         height = np.hypot(*at.T)
-        place, path = refocused(np.linspace(0.0, 6 * um, 1001), radius)
+        place, path = refocused(np.linspace(0.0, 6 * um, 1001), radius, CELL, WATER)
         off = rays.length - reference - np.interp(height, place, path)
         limit = 2 * (CELL - WATER) * sag * radius
         assert -1.5 * limit < off.min() < -0.5 * limit
         errors.append(math.sqrt(np.mean(off**2)))
     assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
-
-
-def image_of_a_cylinder(x, radius, na, parallel):
-    """Field of a plane wave behind a cylinder, imaged within an aperture onto its middle plane: exact waves.
-
-    u = sum of i^n (J_n + b_n H_n) exp(i n a); H_n i^n exp(i n a) is (1 / pi) times the integral of plane waves.
-    """
-    k, m = 2 * np.pi * WATER / RED, CELL / WATER
-    ka = k * radius
-    n = np.arange(int(ka + 4.05 * ka ** (1 / 3) + 30))
-    p, q = (m, 1.0) if parallel else (1.0, m)
-    inside, slope = jv(n, m * ka), jvp(n, m * ka)
-    top = p * jv(n, ka) * slope - q * jvp(n, ka) * inside
-    b = -top / (p * hankel1(n, ka) * slope - q * h1vp(n, ka) * inside)
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    panels = np.linspace(-1.0, 1.0, 97)
-    limit, half = math.asin(na / WATER), 1.0 / 96
-    angle = limit * (0.5 * (panels[:-1] + panels[1:])[:, None] + half * nodes).ravel()
-    weight = limit * half * np.tile(weights, 96)
-    scattered = b[0] + 2 * np.cos(np.outer(angle, n[1:])) @ b[1:]
-    return 1.0 + np.exp(1j * k * np.outer(x, np.sin(angle))) @ (scattered * weight) / np.pi
 
 
 @pytest.mark.parametrize("parallel", [True, False])
@@ -178,7 +149,7 @@ def test_rays_are_within_five_milliradians_of_the_waves(parallel):
     rays, reference = arms(bench)
     x = (rays.pixel[:, 1] - 4.5) * bench.ccd.pitch
     assert np.ptp(x) > 1.6 * radius
-    wave = image_of_a_cylinder(x, radius, 0.8, parallel)
+    wave = waves(x, radius, CELL, WATER, RED, 0.8, parallel)
     phase = 2 * np.pi * (rays.length - reference) / RED
     np.testing.assert_allclose(np.angle(np.exp(1j * phase) / wave), 0.0, atol=RAYS)
     projected = 2 * np.pi * 2 * (CELL - WATER) * np.sqrt(radius**2 - x**2) / RED
@@ -193,7 +164,7 @@ def test_the_recorded_field_is_that_of_the_waves():
     bench = replace(bench, ccd=replace(bench.ccd, pitch=0.2 * um, shape=(1, 401)))
     sample, reference = bench.fields(RED)
     x = (np.arange(401) - 200) * 0.2 * um
-    wave = image_of_a_cylinder(x, radius, 0.8, True)
+    wave = waves(x, radius, CELL, WATER, RED, 0.8)
     ratio = sample[0] / reference[0]
     assert np.abs(np.angle(ratio / wave)).max() < RAYS
     # diffraction at the aperture's edge leaves ripples in the brightness that rays do not have
