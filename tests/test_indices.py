@@ -75,6 +75,6 @@ def test_n_and_kappa_apart():
 
 
 def test_materials_of_one_index_are_equal_whatever_their_name():
-    assert constant(1.0) == constant(1.0, "vacuum")
-    assert hash(constant(1.0)) == hash(constant(1.0, "vacuum"))
-    assert constant(1.0) != constant(1.0 + 1e-9)
+    assert m.constant(1.0) == m.constant(1.0, "vacuum")
+    assert hash(m.constant(1.0)) == hash(m.constant(1.0, "vacuum"))
+    assert m.constant(1.0) != m.constant(1.0 + 1e-9)

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 CONSTANT, BOUNDARY = 0, 1
 REFLECTED, TRANSMITTED, OPAQUE = 1, 2, 4
 FOLLOW = {"both": REFLECTED | TRANSMITTED, "reflected": REFLECTED, "transmitted": TRANSMITTED}
-# Incidence (sin^2) up to which a boundary is met straight on, so that no wavelength is bent by it.
-STRAIGHT = 1e-20
+# Incidence (sin^2, rounded) up to which a boundary is met straight on, so that no wavelength is bent by it.
+STRAIGHT = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,14 +273,21 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
     Raises
     ------
     ValueError
-        If the other wavelength goes another way.
+        If the other wavelength goes another way, or media contradict.
     """
     wavelength = checked_wavelength(wavelength)
     if paths.wavelength is None or paths.wavelength == wavelength or paths.lengths is None:
         return paths
     assert paths.bend is not None
     why, seen = needs(paths.scene), paths.fate == Fate.DETECTED
-    if why is not None and (paths.bend[seen] > STRAIGHT).any():
+    if why is None:
+        return replace(paths, wavelength=wavelength)
+    if paths.contradictions is not None and paths.contradictions.any():
+        raise ValueError(
+            f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since rays came to surfaces in "
+            f"media that these do not have there, got {wavelength:.6g} m: trace once a wavelength"
+        )
+    if (paths.bend[seen] > STRAIGHT).any():
         raise ValueError(
             f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since {why} and "
             f"light is bent, got {wavelength:.6g} m: trace once a wavelength"
@@ -325,6 +332,11 @@ def _straight_on(
     front, back = surface.front or around, surface.back or around
     assert isinstance(surface.interface, (Dielectric, Metal))
     film = surface.interface.film
+    if film is not None and front == back and film != film.reversed():
+        raise ValueError(
+            f"wavelength: expected that of the trace, since {surface.name} has a film that is not the same "
+            f"from behind, between equal media, got {wavelength:.6g} m: trace once a wavelength"
+        )
     if medium != front and film is not None:
         film = film.reversed()
     beyond = back if medium == front else front

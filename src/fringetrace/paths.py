@@ -380,10 +380,12 @@ def project(paths: Paths, ccd: CCD) -> Paths:
     Raises
     ------
     ValueError
-        If the paths were traced onto a CCD already.
+        If the paths were traced onto a CCD already, or light left in a medium that absorbs.
     """
     if paths.ccd is not None:
         raise ValueError("project: expected paths traced without a CCD, got paths that have one")
+    if paths.wavelength is not None and complex(paths.scene.around.index(paths.wavelength)).imag > 0.0:
+        raise ValueError(f"project: expected a transparent medium, got {paths.scene.around.name}")
     u, v, n = ccd.axes
     facing = paths.direction @ n
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -395,8 +397,13 @@ def project(paths: Paths, ccd: CCD) -> Paths:
     width, height = ccd.size
     x, y = offset @ u, offset @ v
     seen = ahead & (abs(x) <= 0.5 * width) & (x < 0.5 * width) & (abs(y) <= 0.5 * height) & (y < 0.5 * height)
+    lengths = paths.lengths
+    if lengths is not None:
+        lengths = lengths.copy()
+        lengths[seen, paths.medium[seen]] += reach[seen]  # type: ignore[index]
     return replace(
         paths,
+        lengths=lengths,
         fate=np.where(seen, np.int8(Fate.DETECTED), paths.fate),
         length=np.where(
             seen, paths.length + reach * (1.0 if paths.index is None else paths.index), paths.length
