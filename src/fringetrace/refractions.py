@@ -110,7 +110,7 @@ def bent(index, first, last, q1, q2, facing, dx, dy, dz, fx, fy, fz, nx, ny, nz)
     fx, fy, fz = fx + fade * nx, fy + fade * ny, fz + fade * nz
     if last.imag == 0.0 and first.imag == 0.0:
         fx, fy, fz = 0.0, 0.0, 0.0
-    scale = 1.0 / size
+    scale = 1.0 / size if size > 0.0 else 0.0  # no light runs there
     # a wave that does not fade is as long as the index says
     plain = last.imag == 0.0 and fx == 0.0 and fy == 0.0 and fz == 0.0
     return x * scale, y * scale, z * scale, (last.real if plain else size), fx, fy, fz
