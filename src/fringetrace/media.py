@@ -309,7 +309,7 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
     return replace(
         paths,
         length=paths.length + paths.lengths @ (new.real - old.real),
-        amplitude=paths.amplitude * factor,
+        amplitude=paths.amplitude * (factor if paths.field is None else np.abs(factor)),
         field=None if paths.field is None else paths.field * factor[:, None],
         index=None if paths.medium is None else new.real[paths.medium],
         wavelength=wavelength,
