@@ -49,6 +49,12 @@ def flow(index, normal):
 
 
 @part
+def shared(through, before):
+    """From amplitudes of E to those of power; nothing goes on where no power flows."""
+    return np.sqrt(through / before) if through > 0.0 and before > 0.0 else 0.0
+
+
+@part
 def fresnel(first, q1, last, q2):
     """Fresnel's r_s, r_p, t_s, t_p, of E, from indices and normal parts n cos; signs as in `films`."""
     a, b = last * last * q1, first * first * q2
@@ -146,7 +152,7 @@ def amplitudes(optics, film, surface, front, number, index, facing, fade, k0):
             rs, rp, ts, tp = fresnel(first, q1, last, q2)
         s, p = flow(first, q1)
         through_s, through_p = flow(last, q2)
-        ts, tp = ts * np.sqrt(max(through_s / s, 0.0)), tp * np.sqrt(max(through_p / p, 0.0))
+        ts, tp = ts * shared(through_s, s), tp * shared(through_p, p)
     return rs, rp, ts, tp, beyond, q1, q2
 
 
@@ -240,7 +246,7 @@ def arrive(count, batch, light, met, triangle, limits, k0, ends, end_light, ende
         way += step * indices[row]
         fx, fy, fz = fading_of(light, row, fading)
         fade = fx * dx + fy * dy + fz * dz
-        if fade != 0.0:
+        if fade > 0.0:  # below by rounding alone: waves in passive media do not grow along the ray
             scalar, ex, ey, ez = field_of(light, amplitude, row, polarised)
             factor = np.exp(-k0 * fade * step)
             gone += power(scalar, ex, ey, ez, polarised) * (1.0 - factor * factor)
