@@ -51,7 +51,11 @@ def amplitude(paths, polarisation=None):
 
 def branches(paths, polarisation=None):
     """Amplitudes by sequence of (face, transmitted)."""
-    return dict(zip((tuple(paths.sequence(k)) for k in range(len(paths))), amplitude(paths, polarisation), strict=True))
+    return dict(
+        zip(
+            (tuple(paths.sequence(k)) for k in range(len(paths))), amplitude(paths, polarisation), strict=True
+        )
+    )
 
 
 def summed(paths, wavelength, polarisation=None, upwards=True, point=(0.0, 0.0, 0.0), away=0.1):

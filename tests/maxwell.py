@@ -107,7 +107,9 @@ def trace(bodies, around, origin, direction, field, most, least=0.0):
     dict of key to Ray
         Keys are tuples of (body, whether transmitted).
     """
-    todo = [Ray(origin, around * direction.astype(complex), field.astype(complex), 1.0, 0.0, (), -1, (-2, None))]
+    todo = [
+        Ray(origin, around * direction.astype(complex), field.astype(complex), 1.0, 0.0, (), -1, (-2, None))
+    ]
     ends = {}
     while todo:
         ray = todo.pop()

@@ -27,7 +27,15 @@ def globe(index=1.5, interface=None, radius=0.5, centre=(0.0, 0.0, 0.0), name="b
 
 
 def beam(side=9, polarisation=None, profile=None, size=1.4):
-    return ft.Beam((0, 0, 2.0), (0.05, 0.02, -1), (0, 1, 0), (size, size), (side, side), profile, polarisation=polarisation)
+    return ft.Beam(
+        (0, 0, 2.0),
+        (0.05, 0.02, -1),
+        (0, 1, 0),
+        (size, size),
+        (side, side),
+        profile,
+        polarisation=polarisation,
+    )
 
 
 def crowd():
@@ -37,8 +45,12 @@ def crowd():
         [
             globe(1.5 + 1e-8j, radius=0.4),
             ft.Surface(shapes.plate(3.0, 3.0).moved((0, 0, 1.0)), ft.BeamSplitter(), "splitter"),
-            ft.Surface(shapes.plate(3.0, 3.0).moved((0, 0, -1.0)), ft.Dielectric(film=film), "coat", back="BK7"),
-            ft.Surface(shapes.plate(3.0, 3.0).moved((0, 0, -1.5)), ft.Metal(), "gold", front="BK7", back="gold"),
+            ft.Surface(
+                shapes.plate(3.0, 3.0).moved((0, 0, -1.0)), ft.Dielectric(film=film), "coat", back="BK7"
+            ),
+            ft.Surface(
+                shapes.plate(3.0, 3.0).moved((0, 0, -1.5)), ft.Metal(), "gold", front="BK7", back="gold"
+            ),
         ],
         medium="air",
     )
@@ -126,7 +138,9 @@ def test_what_is_not_followed_is_truncated(polarisation):
     light = beam(9, polarisation)
     both = ft.trace(ft.Scene([globe()]), light, min_amplitude=0.0, max_bounces=3)
     for follow, through in (("reflected", False), ("transmitted", True)):
-        paths = ft.trace(ft.Scene([globe(1.5, ft.Dielectric(follow))]), light, min_amplitude=0.0, max_bounces=3)
+        paths = ft.trace(
+            ft.Scene([globe(1.5, ft.Dielectric(follow))]), light, min_amplitude=0.0, max_bounces=3
+        )
         ledger = paths.ledger()
         assert ledger.error < LEDGER
         assert ledger.truncated > 0.01 * ledger.incident
@@ -134,14 +148,19 @@ def test_what_is_not_followed_is_truncated(polarisation):
         assert len(paths) == 81
         assert {t for row in range(81) for _, t in paths.sequence(row)} == {through}
         # what is followed is the same as where both are
-        rows = [np.flatnonzero((both.ray == ray) & (both.key == key))[0] for ray, key in zip(paths.ray, paths.key, strict=True)]
+        rows = [
+            np.flatnonzero((both.ray == ray) & (both.key == key))[0]
+            for ray, key in zip(paths.ray, paths.key, strict=True)
+        ]
         np.testing.assert_array_equal(paths.amplitude, both.amplitude[rows])
         np.testing.assert_array_equal(paths.length, both.length[rows])
 
 
 def test_total_reflection_where_only_transmitted_light_is_followed():
     """There is none: the ray ends, its power is dropped."""
-    scene = ft.Scene([ft.Surface(shapes.plate(1, 1), ft.Dielectric("transmitted"), "face", back=1.0)], medium=1.5)
+    scene = ft.Scene(
+        [ft.Surface(shapes.plate(1, 1), ft.Dielectric("transmitted"), "face", back=1.0)], medium=1.5
+    )
     paths = ft.trace(scene, glass.aimed(1.0))
     assert paths.fate.tolist() == [Fate.ABSORBED]
     assert paths.amplitude.tolist() == [0.0]
@@ -170,7 +189,11 @@ def test_least_amplitude_and_most_bounces():
 def test_amplitudes_are_relative_to_what_is_launched():
     scene = glass.stack([1.0, 1.5 + 1e-6j, 1.0], [10 * um])
     one, many = (
-        ft.trace(scene, ft.Rays([(0, 0, 1)], [(0.1, 0, -1)], amplitude=[a], polarisation=[(0, 1, 0)]), wavelength=600 * nm)
+        ft.trace(
+            scene,
+            ft.Rays([(0, 0, 1)], [(0.1, 0, -1)], amplitude=[a], polarisation=[(0, 1, 0)]),
+            wavelength=600 * nm,
+        )
         for a in (1.0, 30j)
     )
     np.testing.assert_allclose(many.field, 30j * one.field, rtol=1e-15)
@@ -182,7 +205,9 @@ def test_amplitudes_are_relative_to_what_is_launched():
 @pytest.mark.parametrize("polarisation", [None, (1.0, 1.0)])
 def test_a_beam_in_a_dense_medium_that_absorbs(polarisation):
     """Damping along the way, to the CCD as well; path in vacuum wavelengths."""
-    scene = ft.Scene([ft.Surface(shapes.plate(1, 1).moved((0, 0, -1.0)), ft.Mirror(), "m")], medium=1.33 + 2e-8j)
+    scene = ft.Scene(
+        [ft.Surface(shapes.plate(1, 1).moved((0, 0, -1.0)), ft.Mirror(), "m")], medium=1.33 + 2e-8j
+    )
     light = ft.Beam((0, 0, 1.0), (0, 0, -1), (0, 1, 0), (0.1, 0.1), (2, 2), polarisation=polarisation)
     ccd = ft.CCD((0, 0, 0.5), (0, 0, -1), (0, 1, 0), 0.1, (2, 2))
     paths = ft.trace(scene, light, ccd, wavelength=600 * nm)
@@ -193,7 +218,12 @@ def test_a_beam_in_a_dense_medium_that_absorbs(polarisation):
     if polarisation is None:
         np.testing.assert_allclose(paths.amplitude, -expected, rtol=1e-14)
     else:
-        np.testing.assert_allclose(paths.field, -expected * np.tile(light.polarisation @ light.axes[:2], (4, 1)), rtol=1e-14, atol=1e-16)
+        np.testing.assert_allclose(
+            paths.field,
+            -expected * np.tile(light.polarisation @ light.axes[:2], (4, 1)),
+            rtol=1e-14,
+            atol=1e-16,
+        )
     assert paths.ledger().error < LEDGER
     assert paths.ledger().absorbed == pytest.approx(0.01 * (1.0 - expected**2), rel=1e-12)
 
@@ -210,7 +240,9 @@ def test_contradictions_are_counted_and_told():
     )
     # normals the wrong way round
     mesh = shapes.icosphere(0.5, 2)
-    turned = ft.Scene([ft.Surface(ft.Mesh(mesh.vertices, mesh.faces[:, ::-1]), ft.Dielectric(), "inside out", back=1.5)])
+    turned = ft.Scene(
+        [ft.Surface(ft.Mesh(mesh.vertices, mesh.faces[:, ::-1]), ft.Dielectric(), "inside out", back=1.5)]
+    )
     paths = ft.trace(turned, ft.Rays([(0, 0, 2.0)], [(0, 0, -1.0)]))
     assert paths.contradictions[0] > 0
     assert paths.ledger().error < LEDGER
@@ -252,7 +284,9 @@ def test_projected_light_is_that_of_a_trace_to_the_ccd(polarisation):
 
 def test_mirrors_and_splitters_in_a_medium_as_in_a_vacuum():
     """The same amplitudes by the way through matter as by that without, scalar and polarised."""
-    surfaces = crowd().surfaces[1:2] + (ft.Surface(shapes.plate(3, 3).moved((0, 0, -1)), ft.Mirror(0.9), "m"),)
+    surfaces = crowd().surfaces[1:2] + (
+        ft.Surface(shapes.plate(3, 3).moved((0, 0, -1)), ft.Mirror(0.9), "m"),
+    )
     plain = ft.trace(ft.Scene(surfaces), beam(), max_bounces=8)
     dense = ft.trace(ft.Scene(surfaces, medium=1.5), beam(), max_bounces=8)
     same(plain, dense, ("fate", "bounces", "reflections", "key", "ray"))
@@ -285,7 +319,9 @@ def test_reversing_a_path_gives_it_back():
         states = np.stack([v / np.linalg.norm(v), np.cross(out, v / np.linalg.norm(v))])
         key = tuple(reversed(scalar.sequence(row)))
         back = ft.trace(scene, ft.Rays([end], [out]), **settings)
-        its = next(k for k in range(len(back)) if tuple(back.sequence(k)) == key and back.fate[k] == Fate.LEFT)
+        its = next(
+            k for k in range(len(back)) if tuple(back.sequence(k)) == key and back.fate[k] == Fate.LEFT
+        )
         np.testing.assert_allclose(back.direction[its], -direction, rtol=0, atol=1e-10)
         ahead = (start - back.origin[its]) @ -direction
         assert back.length[its] + 1.2 * ahead == pytest.approx(scalar.length[row] + 1.2 * 1.5, rel=1e-12)
@@ -293,7 +329,10 @@ def test_reversing_a_path_gives_it_back():
         matrix = np.array([[states[j] @ fields[i].field[row] for i in (0, 1)] for j in (0, 1)])
         other = np.array(
             [
-                [basis[i] @ ft.trace(scene, ft.Rays([end], [out], polarisation=[e]), **settings).field[its] for e in states]
+                [
+                    basis[i] @ ft.trace(scene, ft.Rays([end], [out], polarisation=[e]), **settings).field[its]
+                    for e in states
+                ]
                 for i in (0, 1)
             ]
         )
@@ -315,7 +354,8 @@ def test_power_adds_up(first, second, around, state, film, polarised, slope):
     """In lossless scenes nothing is absorbed, at any angle, state and index."""
     coat = Film([(n, d * nm) for n, d in film])
     scene = ft.Scene(
-        [globe(first, ft.Dielectric(film=coat)), globe(second, centre=(0, 0, -1.2), name="other")], medium=around
+        [globe(first, ft.Dielectric(film=coat)), globe(second, centre=(0, 0, -1.2), name="other")],
+        medium=around,
     )
     jones = (state[0], state[1] * np.exp(1j * state[2])) if polarised else None
     light = ft.Beam((0, 0, 2.0), (*slope, -1.0), (0, 1, 0), (1.5, 1.5), (4, 4), polarisation=jones)
@@ -348,7 +388,12 @@ def test_keys_of_further_branches():
         expected = (paths.surface == k).sum(axis=1)
         np.testing.assert_array_equal(paths.visits(k), expected)
     for chunk in (1, 4):
-        same(paths, ft.trace(scene, beam(3, (1.0, 0.4j)), wavelength=600 * nm, max_bounces=4, record=True, chunk=chunk))
+        same(
+            paths,
+            ft.trace(
+                scene, beam(3, (1.0, 0.4j)), wavelength=600 * nm, max_bounces=4, record=True, chunk=chunk
+            ),
+        )
     # neighbours of one key took the same branch: a direction each
     first = paths.where(paths.bounces >= 1)
     for key in np.unique(first.key):
@@ -357,7 +402,8 @@ def test_keys_of_further_branches():
 
 
 numbers = st.one_of(
-    st.floats(1e-3, 5.0), st.sampled_from([1.0, 1.5, 1e-6, 1e6, 1e-3j, 1e3j, 1e6j, 1.5 + 1e-12j, 0.2 + 3.4j, 1 + 1e4j])
+    st.floats(1e-3, 5.0),
+    st.sampled_from([1.0, 1.5, 1e-6, 1e6, 1e-3j, 1e3j, 1e6j, 1.5 + 1e-12j, 0.2 + 3.4j, 1 + 1e4j]),
 )
 
 
@@ -383,7 +429,9 @@ def test_nothing_crashes(one, two, around, turned, formed, metal, film, waveleng
         ft.Surface(shapes.icosphere(0.5, 1).moved((0, 0, -0.5)), ft.Dielectric(), "two", back=two),
     ]
     light = ft.Beam(start, way, (0, 1, 0), (1.2, 1.2), (3, 3), polarisation=jones)
-    paths = ft.trace(ft.Scene(surfaces, medium=around), light, wavelength=wavelength, max_bounces=6, record=True)
+    paths = ft.trace(
+        ft.Scene(surfaces, medium=around), light, wavelength=wavelength, max_bounces=6, record=True
+    )
     for name in ("amplitude", "length", "lost", "direction", "origin", "index", "lengths", "dropped", "bend"):
         assert np.isfinite(getattr(paths, name)).all(), name
     if paths.field is not None:

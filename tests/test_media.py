@@ -31,7 +31,10 @@ def test_constants_of_two_rooms_agree():
 
 def test_media_by_number():
     one = ft.Scene(
-        [ft.Surface(PLATE, ft.Dielectric(), "a", back="BK7"), ft.Surface(PLATE.moved((0, 0, -1)), ft.Dielectric(), "b", front="BK7", back=1.33)],
+        [
+            ft.Surface(PLATE, ft.Dielectric(), "a", back="BK7"),
+            ft.Surface(PLATE.moved((0, 0, -1)), ft.Dielectric(), "b", front="BK7", back=1.33),
+        ],
         medium="air",
     )
     assert media_of(one) == (materials.AIR, materials.BK7, materials.constant(1.33))
@@ -67,7 +70,10 @@ def test_where_light_meets_nothing_but_constants_in_a_vacuum():
         (scene(back=1.5, medium="water"), "water is dispersive"),
         (scene(back=materials.constant(1.5 + 1j, "tar")), "tar absorbs"),
         (scene(ft.Dielectric(film=Film([(1.38, 1e-7)])), back=1.5), "face has a film"),
-        (ft.Scene([ft.Surface(PLATE, ft.gratings.Grating((1, 0, 0), 1e-5, (0, 1)), "ruling")]), "ruling depends on it"),
+        (
+            ft.Scene([ft.Surface(PLATE, ft.gratings.Grating((1, 0, 0), 1e-5, (0, 1)), "ruling")]),
+            "ruling depends on it",
+        ),
         (ft.Scene([ft.Surface(PLATE, ft.Mirror())]), None),
     ],
 )
@@ -98,7 +104,9 @@ def test_indices_beyond_numbers(index):
     with pytest.raises(ValueError, match=r"expected an index of magnitude 1e-07 to 1e\+07, got"):
         ft.trace(scene(back=index), glass.aimed(0.1), wavelength=500 * nm)
     with pytest.raises(ValueError, match=r"expected an index of magnitude 1e-07 to 1e\+07, got"):
-        ft.trace(scene(ft.Dielectric(film=Film([(index, 1e-9)])), back=1.5), glass.aimed(0.1), wavelength=500 * nm)
+        ft.trace(
+            scene(ft.Dielectric(film=Film([(index, 1e-9)])), back=1.5), glass.aimed(0.1), wavelength=500 * nm
+        )
 
 
 def test_an_element_that_wants_polarised_light():
@@ -133,7 +141,9 @@ def onto(scene, angle, wavelength):
 
 def test_light_that_is_bent_wants_a_new_trace():
     paths = onto(slab(), 0.3, 500 * nm)
-    with pytest.raises(ValueError, match="expected that of the trace, 5e-07 m, since .* is dispersive and light is bent"):
+    with pytest.raises(
+        ValueError, match="expected that of the trace, 5e-07 m, since .* is dispersive and light is bent"
+    ):
         ft.complex_field(paths, 600 * nm, "rays")
     # what is bent, but not seen, does not matter
     aside = ft.trace(slab(), glass.aimed(0.3), wavelength=500 * nm)
@@ -150,11 +160,19 @@ def test_straight_on_but_for_rounding_is_straight_on(seed):
     again = at_wavelength(one, 600 * nm)
     for key in np.intersect1d(one.key, other.key):
         np.testing.assert_allclose(again.length[again.key == key], other.length[other.key == key], rtol=1e-14)
-        np.testing.assert_allclose(again.amplitude[again.key == key], other.amplitude[other.key == key], rtol=1e-12)
+        np.testing.assert_allclose(
+            again.amplitude[again.key == key], other.amplitude[other.key == key], rtol=1e-12
+        )
 
 
 def test_more_bounces_than_a_key_tells():
-    paths = ft.trace(glass.stack([1.0, 1.5, 1.0], [1e-3]), glass.aimed(0.3), wavelength=500 * nm, min_amplitude=1e-40, max_bounces=60)
+    paths = ft.trace(
+        glass.stack([1.0, 1.5, 1.0], [1e-3]),
+        glass.aimed(0.3),
+        wavelength=500 * nm,
+        min_amplitude=1e-40,
+        max_bounces=60,
+    )
     assert paths.bounces.max() > 40
     assert at_wavelength(paths, 600 * nm).wavelength == 600 * nm
 
@@ -162,8 +180,12 @@ def test_more_bounces_than_a_key_tells():
 def test_a_film_that_is_not_the_same_from_behind():
     """Between equal media a key does not tell from which side light came."""
     film = Film([(2.3, 40 * nm), (1.38, 90 * nm)])
-    paths = ft.trace(glass.stack([1.0, 1.0], films=[film]), glass.aimed(0.0, upwards=True), wavelength=600 * nm)
-    with pytest.raises(ValueError, match="face 0 has a film that is not the same from behind, between equal media"):
+    paths = ft.trace(
+        glass.stack([1.0, 1.0], films=[film]), glass.aimed(0.0, upwards=True), wavelength=600 * nm
+    )
+    with pytest.raises(
+        ValueError, match="face 0 has a film that is not the same from behind, between equal media"
+    ):
         at_wavelength(paths, 500 * nm)
     alike = Film([(2.3, 40 * nm), (1.38, 90 * nm), (2.3, 40 * nm)])
     one, other = (
@@ -178,12 +200,16 @@ def test_films_are_met_from_behind():
     film = Film([(2.3, 40 * nm), (1.38 + 0.1j, 90 * nm)])
     behind = ft.Scene(glass.stack(["air", "BK7"], films=[film]).surfaces, medium="BK7")
     for upwards, there in ((True, behind), (False, glass.stack(["air", "BK7"], films=[film]))):
-        one, other = (ft.trace(there, glass.aimed(0.0, upwards=upwards), wavelength=w) for w in (600 * nm, 500 * nm))
+        one, other = (
+            ft.trace(there, glass.aimed(0.0, upwards=upwards), wavelength=w) for w in (600 * nm, 500 * nm)
+        )
         np.testing.assert_allclose(at_wavelength(one, 500 * nm).amplitude, other.amplitude, rtol=1e-13)
 
 
 def test_contradicting_media_want_a_new_trace():
-    ball = ft.Surface(shapes.icosphere(0.5, 1), ft.Dielectric(), "ball", forms.Sphere((0, 0, 0), 0.5), back="BK7")
+    ball = ft.Surface(
+        shapes.icosphere(0.5, 1), ft.Dielectric(), "ball", forms.Sphere((0, 0, 0), 0.5), back="BK7"
+    )
     paths = ft.trace(ft.Scene([ball]), ft.Rays([(0, 0, 0)], [(0, 0, 1)]), wavelength=500 * nm)
     with pytest.raises(ValueError, match="rays came to surfaces in media that these do not have there"):
         at_wavelength(paths, 600 * nm)
@@ -195,7 +221,12 @@ def test_contradicting_media_want_a_new_trace():
 @pytest.mark.parametrize(
     ("kind", "sides", "error", "message"),
     [
-        (ft.Dielectric(), {}, ValueError, "face: expected a medium in front of a Dielectric or behind it, got none"),
+        (
+            ft.Dielectric(),
+            {},
+            ValueError,
+            "face: expected a medium in front of a Dielectric or behind it, got none",
+        ),
         (ft.Metal(), {}, ValueError, "face: expected a medium in front of a Metal or behind it, got none"),
         (ft.Mirror(), {"front": 1.5}, ValueError, "face front: expected no medium beside a Mirror, got one"),
         (ft.Dielectric(), {"back": object()}, TypeError, "face back: expected a Material"),
@@ -218,7 +249,9 @@ def test_media_of_a_scene():
     assert moved.back == materials.BK7
 
 
-@pytest.mark.parametrize("value", [(1, 0, 0), (0, 0), (math.nan, 1), "xy", None.__class__, 3.0, (math.inf, 0)])
+@pytest.mark.parametrize(
+    "value", [(1, 0, 0), (0, 0), (math.nan, 1), "xy", None.__class__, 3.0, (math.inf, 0)]
+)
 def test_bad_polarisation_of_a_beam(value):
     with pytest.raises(ValueError, match="Beam polarisation: expected"):
         ft.Beam((0, 0, 1), (0, 0, -1), (0, 1, 0), (1, 1), (2, 2), polarisation=value)
@@ -265,5 +298,8 @@ def test_films_of_boundaries(value):
 
 
 def test_branches_to_follow():
-    with pytest.raises(ValueError, match=r"Dielectric follow: expected one of \('both', 'reflected', 'transmitted'\), got 'none'"):
+    with pytest.raises(
+        ValueError,
+        match=r"Dielectric follow: expected one of \('both', 'reflected', 'transmitted'\), got 'none'",
+    ):
         ft.Dielectric("none")

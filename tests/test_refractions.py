@@ -47,7 +47,9 @@ def shower(seed, count, towards, spread=0.4, away=4.0):
     random = np.random.default_rng(seed)
     start = random.normal(size=(count, 3))
     start *= away / np.linalg.norm(start, axis=1)[:, None]
-    aim = np.asarray(towards)[random.integers(len(towards), size=count)] + random.uniform(-spread, spread, (count, 3))
+    aim = np.asarray(towards)[random.integers(len(towards), size=count)] + random.uniform(
+        -spread, spread, (count, 3)
+    )
     direction = aim - start
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     field = random.normal(size=(count, 3)) + 1j * random.normal(size=(count, 3))

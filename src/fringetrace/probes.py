@@ -149,10 +149,16 @@ def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
     Returns
     -------
     list of (triangles,) int64
-        A number for the part that each triangle belongs to, one array a surface; below 0 on a form.
+        A number for the part that each triangle belongs to, one array a surface; below 0 on a form, and
+        beside media that absorb: waves off there are not plane, or not even.
     """
     if "parts" not in scene.derived:
-        scene.derived["parts"] = [_parts(surface) for surface in scene.surfaces]
+        found = [_parts(surface) for surface in scene.surfaces]
+        for surface, parts in zip(scene.surfaces, found, strict=True):
+            sides = (surface.front or scene.around, surface.back or scene.around)
+            if any(medium.kappa is not None for medium in sides):
+                parts[parts >= 0] = parts.min(initial=0) - 1 - parts[parts >= 0]
+        scene.derived["parts"] = found
     parts: list[npt.NDArray[np.int64]] = scene.derived["parts"]
     return parts
 

@@ -94,8 +94,11 @@ def averaged(waves, ccd, around, points=10):
     field = np.zeros(len(x), dtype=complex)
     for k, c, a in waves:
         # per area of the beam: light that arrives aslant is spread over more of the CCD
-        field += a * math.sqrt(around / -k[2]) * math.sqrt(abs(k[2]) / around) ** 2 * np.exp(
-            2j * math.pi / HENE * (place @ k + c)
+        field += (
+            a
+            * math.sqrt(around / -k[2])
+            * math.sqrt(abs(k[2]) / around) ** 2
+            * np.exp(2j * math.pi / HENE * (place @ k + c))
         )
     line = (np.abs(field) ** 2).reshape(columns, points) @ (0.5 * weights)
     return np.tile(line, (rows, 1))
@@ -106,7 +109,9 @@ def test_fringes_of_equal_inclination(tilt, n):
     """A tilted slab lets through what Airy's sum says, everywhere."""
     thickness = 200 * um
     scene = wedge(n, thickness * math.cos(tilt), tilt)
-    r = (math.cos(tilt) - math.sqrt(n**2 - math.sin(tilt) ** 2)) / (math.cos(tilt) + math.sqrt(n**2 - math.sin(tilt) ** 2))
+    r = (math.cos(tilt) - math.sqrt(n**2 - math.sin(tilt) ** 2)) / (
+        math.cos(tilt) + math.sqrt(n**2 - math.sin(tilt) ** 2)
+    )
     depth = 200 * um * math.cos(tilt) ** 2  # faces stand z apart along the vertical
     turn = 4 * math.pi / HENE * depth * math.sqrt(n**2 - math.sin(tilt) ** 2)
     airy = 1.0 / (1.0 + 4.0 * r**2 / (1.0 - r**2) ** 2 * math.sin(0.5 * turn) ** 2)
@@ -115,7 +120,10 @@ def test_fringes_of_equal_inclination(tilt, n):
     # light across the plane of tilt is s light
     polarised = ft.trace(scene, lit((0.0, 1.0)), screen(), min_amplitude=1e-6, max_bounces=40)
     np.testing.assert_allclose(
-        ft.irradiance(polarised, HENE, "wavefront"), ft.irradiance(paths, HENE, "wavefront"), rtol=0, atol=1e-12
+        ft.irradiance(polarised, HENE, "wavefront"),
+        ft.irradiance(paths, HENE, "wavefront"),
+        rtol=0,
+        atol=1e-12,
     )
 
 
@@ -171,11 +179,30 @@ def test_another_wavelength_needs_no_new_trace_where_nothing_is_bent(state):
     film = Film([(1.38, 100 * nm), (2.3, 60 * nm)])
     surfaces = [
         ft.Surface(shapes.plate(0.1, 0.1), ft.Dielectric(film=film), "front", back="BK7"),
-        ft.Surface(shapes.plate(0.1, 0.1).moved((0, 0, -2 * mm)), ft.Dielectric(), "glue", front="BK7", back=1.6 + 1e-5j),
-        ft.Surface(shapes.plate(0.1, 0.1).moved((0, 0, -3 * mm)), ft.Metal(film), "gold", front=1.6 + 1e-5j, back="gold"),
+        ft.Surface(
+            shapes.plate(0.1, 0.1).moved((0, 0, -2 * mm)),
+            ft.Dielectric(),
+            "glue",
+            front="BK7",
+            back=1.6 + 1e-5j,
+        ),
+        ft.Surface(
+            shapes.plate(0.1, 0.1).moved((0, 0, -3 * mm)),
+            ft.Metal(film),
+            "gold",
+            front=1.6 + 1e-5j,
+            back="gold",
+        ),
     ]
     scene = ft.Scene([surface.moved(turn=turn) for surface in surfaces], medium="air")
-    beam = ft.Beam(turn @ (0, 0, 10 * mm), turn @ (0, 0, -1), turn @ (0, 1, 0), (1 * mm, 1 * mm), (3, 3), polarisation=state)
+    beam = ft.Beam(
+        turn @ (0, 0, 10 * mm),
+        turn @ (0, 0, -1),
+        turn @ (0, 1, 0),
+        (1 * mm, 1 * mm),
+        (3, 3),
+        polarisation=state,
+    )
     ccd = ft.CCD(turn @ (0, 0, 12 * mm), turn @ (0, 0, -1), turn @ (0, 1, 0), 1 * mm, (3, 3))
     one, other = (ft.trace(scene, beam, ccd, wavelength=w, min_amplitude=1e-9) for w in (500 * nm, 640 * nm))
     again = at_wavelength(one, 640 * nm)
@@ -296,3 +323,20 @@ def test_indices_of_recorded_paths():
     kz = np.sqrt((1.5 + 0.3j) ** 2 - math.sin(0.5) ** 2)
     np.testing.assert_allclose(along[once][:, 1], math.hypot(kz.real, math.sin(0.5)), rtol=1e-14)
     assert np.abs(rounding(paths)).max() < 1e-15
+
+
+def test_an_absorbing_wedge_is_darker_where_it_is_thicker():
+    """Straight through a wedge: the brightness follows the way in the glass, not that of one ray."""
+    faces = wedge(1.5 + 2e-5j, 1 * mm, 0.0, 0.1).surfaces
+    scene = ft.Scene(
+        [ft.Surface(f.mesh, ft.Dielectric("transmitted"), f.name, front=f.front, back=f.back) for f in faces]
+    )
+    ccd = screen(8, 1 * mm)
+    image = ft.irradiance(ft.trace(scene, lit(), ccd, wavelength=HENE), HENE, "wavefront")
+    fine = ft.trace(scene, lit(shape=(1, 2000)), ccd, wavelength=HENE).detected
+    x, bright = fine.pixel[:, 1], np.abs(fine.amplitude) ** 2
+    mean = np.array([bright[(x >= k) & (x < k + 1)].mean() for k in range(8)])
+    assert np.ptp(mean) > 0.1
+    # by how much a beam is wider behind the wedge is the same everywhere; 160 rays to a pixel
+    part = image / mean
+    np.testing.assert_allclose(part, part.mean(), rtol=1e-4)

@@ -29,7 +29,9 @@ states = st.sampled_from([None, "s", "p"])
 def struck(first, last, angle, polarisation, wavelength=None, interface=None):
     """A ray at one face, the angle in degrees: amplitudes of power by sequence."""
     scene = glass.stack([first, last], interface=interface)
-    paths = ft.trace(scene, glass.aimed(angle * degree, polarisation), wavelength=wavelength, min_amplitude=0.0)
+    paths = ft.trace(
+        scene, glass.aimed(angle * degree, polarisation), wavelength=wavelength, min_amplitude=0.0
+    )
     assert paths.ledger().error < LEDGER
     return glass.branches(paths, polarisation)
 
@@ -104,7 +106,9 @@ def test_goos_haenchen():
     assert -slope / (k * math.cos(math.pi / 3)) == pytest.approx(420.8992, rel=10 * step**2 + 1.2e-7)
 
 
-@pytest.mark.parametrize(("angle", "s", "p"), [(0.0, 0.944358978, 0.944358978), (45.0, 0.961122032, 0.923755560)])
+@pytest.mark.parametrize(
+    ("angle", "s", "p"), [(0.0, 0.944358978, 0.944358978), (45.0, 0.961122032, 0.923755560)]
+)
 def test_gold_mirror(angle, s, p):
     for state, expected in (("s", s), ("p", p), (None, s)):
         got = struck(1.0, 0.18344 + 3.4332j, angle, state, 633 * nm, ft.Metal())
@@ -162,7 +166,9 @@ def test_stokes_relations(first, last, angle, state):
     sine = first * math.sin(angle) / last
     if sine > 0.999:  # total reflection: there is no wave to send back
         return
-    there = glass.branches(ft.trace(glass.stack([first, last]), glass.aimed(angle, state), min_amplitude=0.0), state)
+    there = glass.branches(
+        ft.trace(glass.stack([first, last]), glass.aimed(angle, state), min_amplitude=0.0), state
+    )
     scene = ft.Scene(glass.stack([first, last]).surfaces, medium=last)
     back = glass.branches(
         ft.trace(scene, glass.aimed(math.asin(sine), state, upwards=True), min_amplitude=0.0), state

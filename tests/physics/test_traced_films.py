@@ -84,7 +84,9 @@ def test_black_film():
 def test_sum_over_traced_bounces_converges_to_the_film():
     """Each bounce more in a soap film brings the sum nearer by |r01 r12|, as printed for 500 nm."""
     whole = rival([1.0, 1.33, 1.0], [300 * nm], 0.0, 500 * nm, "s")[0]
-    paths = ft.trace(glass.stack([1.0, 1.33, 1.0], [300 * nm]), glass.aimed(0.0), min_amplitude=0.0, max_bounces=16)
+    paths = ft.trace(
+        glass.stack([1.0, 1.33, 1.0], [300 * nm]), glass.aimed(0.0), min_amplitude=0.0, max_bounces=16
+    )
     errors = []
     for extra in range(6):
         some = paths.where(paths.bounces <= 1 + 2 * extra)
@@ -115,7 +117,9 @@ def test_two_layers_by_bounces(state):
     indices, thickness = [1.0, 1.38, 1.7, 1.52], [100 * nm, 160 * nm]
     for angle in (0.0, 0.7):
         found = bounced(indices, thickness, angle, 550 * nm, state, least=1e-12)
-        np.testing.assert_allclose(found, rival(indices, thickness, angle, 550 * nm, state), rtol=0, atol=RIVAL)
+        np.testing.assert_allclose(
+            found, rival(indices, thickness, angle, 550 * nm, state), rtol=0, atol=RIVAL
+        )
 
 
 def test_quarter_wave_mirror_by_bounces():
@@ -175,7 +179,8 @@ def test_absorbing_layers_by_bounces(indices, thickness, state):
 
 @given(
     layers=st.lists(
-        st.tuples(st.floats(1.0, 3.0), st.sampled_from([0.0, 0.0, 0.1, 2.0]), st.floats(1.0, 900.0)), max_size=5
+        st.tuples(st.floats(1.0, 3.0), st.sampled_from([0.0, 0.0, 0.1, 2.0]), st.floats(1.0, 900.0)),
+        max_size=5,
     ),
     first=st.floats(1.0, 2.0),
     last=st.floats(2.0, 3.0),
