@@ -22,7 +22,7 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import forms, goniometer, instruments, meshes, phase, shapes, vectors, views
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -47,6 +47,7 @@ __all__ = [
     "complex_field",
     "degree",
     "forms",
+    "goniometer",
     "instruments",
     "irradiance",
     "meshes",
@@ -63,7 +64,7 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = ("forms", "goniometer", "instruments", "meshes", "phase", "shapes", "vectors", "views")
 
 
 def __getattr__(name: str) -> Any:
