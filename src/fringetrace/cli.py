@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
+from fringetrace import commands
 from fringetrace.drawing import unit_of
 from fringetrace.mesh import Mesh
 from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length
@@ -31,7 +32,10 @@ app = App(
     name="fringetrace",
     version=fringetrace.__version__,
     help="Triangle meshes to full-field interferograms, with a phase you can trust.",
+    default_parameter=Parameter(consume_multiple=True),
 )
+app.command(commands.brdf)
+app.command(commands.lattice)
 
 FRINGES = 10.0
 # The demo's relief and aperture: slopes that 512 pixels still resolve.
@@ -147,7 +151,7 @@ def bench(
     *,
     out: Path = Path("fringetrace-bench"),
     quick: bool = False,
-    scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    scenes: tuple[str, ...] = (),
 ) -> None:
     """Run time against error on this machine: methods on scenes whose field is known in closed form.
 
@@ -290,6 +294,14 @@ def _say(console: Console, what: str, text: str) -> None:
     console.print(f"{what:<12} {text}", markup=False)
 
 
+def _print(lines: commands.Lines) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=True)
+    for what, text in lines:
+        _say(console, what, text)
+
+
 def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength: float) -> None:
     from fringetrace.bench import path_slope
 
@@ -377,7 +389,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         command, bound, _ = app.parse_args(arguments, print_error=False, exit_on_error=False)
-        command(*bound.args, **bound.kwargs)
+        _print(command(*bound.args, **bound.kwargs) or [])
     except (CycloptsError, ValueError, OSError, RuntimeError, MemoryError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
         sys.stderr.write(f"fringetrace: {text}\n")

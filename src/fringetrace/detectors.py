@@ -72,8 +72,13 @@ def checked_angles(angles: npt.ArrayLike, what: str, most: float | None = None) 
 class Detector(Protocol):
     """Directions, a grid theta x phi, and what falls into each of them."""
 
-    theta: FloatArray
-    phi: FloatArray
+    @property
+    def theta(self) -> FloatArray:
+        """(a,) float64, radians, from the normal."""
+
+    @property
+    def phi(self) -> FloatArray:
+        """(b,) float64, radians, about the normal."""
 
     @property
     def solid_angle(self) -> FloatArray:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import csv
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 if TYPE_CHECKING:
     from xarray import DataArray as DataArray
@@ -69,10 +73,35 @@ def write_netcdf(data: DataArray | Dataset, path: str | os.PathLike[str]) -> Non
     data : xarray.DataArray or xarray.Dataset
     path : path-like
     """
+    with _beside(path) as part:
+        data.to_netcdf(part, engine="h5netcdf")
+
+
+def write_csv(data: DataArray, path: str | os.PathLike[str]) -> None:
+    """Write a labelled array as text: a row for each value, after those of its coordinates, in SI units.
+
+    Parameters
+    ----------
+    data : xarray.DataArray
+    path : path-like
+    """
+    axes = [np.asarray(data[name]) for name in data.dims]
+    columns = [grid.ravel() for grid in np.meshgrid(*axes, indexing="ij")]
+    with _beside(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        lines = csv.writer(file)
+        lines.writerow([*map(str, data.dims), str(data.name)])
+        lines.writerows(
+            zip(*(column.tolist() for column in columns), data.values.ravel().tolist(), strict=True)
+        )
+
+
+@contextlib.contextmanager
+def _beside(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A file to write, moved into place once it is whole."""
     target = Path(path)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
-        data.to_netcdf(beside, engine="h5netcdf")
-        os.replace(beside, target)
+        yield part
+        os.replace(part, target)
     finally:
-        beside.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)

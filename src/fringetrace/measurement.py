@@ -11,20 +11,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace import labels
 from fringetrace.bench import Bench, path_slope, pixel_centres
 from fringetrace.field import chosen
 from fringetrace.mesh import Mesh
 from fringetrace.meshes import interpolate_height
 from fringetrace.paths import Ledger
 from fringetrace.waves import Array, FloatArray
-
-if TYPE_CHECKING:
-    from xarray import Dataset
 
 # A bend of this many waves a pixel is a step.
 STEP = 0.02
@@ -213,7 +210,7 @@ def staged(folder: Path) -> Iterator[Path]:
         raise
 
 
-def dataset(measurement: Measurement) -> Dataset:
+def dataset(measurement: Measurement) -> labels.Dataset:
     """Everything, labelled.
 
     Parameters
@@ -225,8 +222,6 @@ def dataset(measurement: Measurement) -> Dataset:
     xarray.Dataset
         Coordinates x, y (metres) and step (radians); units in the attributes of each variable.
     """
-    import xarray
-
     m = measurement
     steps, *shape = m.frames.shape
     x, y = pixel_centres((shape[0], shape[1]), m.pitch)
@@ -259,7 +254,7 @@ def dataset(measurement: Measurement) -> Dataset:
         **{f"power_{name}": value for name, value in vars(m.ledger).items()},
         **{f"version_{name}": version(name) for name in LIBRARIES},
     }
-    return xarray.Dataset(variables, coordinates, attributes)
+    return labels.dataset(variables, coordinates, attributes)
 
 
 def write_netcdf(measurement: Measurement, path: Path) -> None:
@@ -270,7 +265,7 @@ def write_netcdf(measurement: Measurement, path: Path) -> None:
     measurement : Measurement
     path : Path
     """
-    dataset(measurement).to_netcdf(path, engine="h5netcdf")
+    labels.write_netcdf(dataset(measurement), path)
 
 
 def counts(images: FloatArray, full_scale: float) -> Array:

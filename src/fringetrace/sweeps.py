@@ -132,7 +132,8 @@ def _workers(executor: Executor | None, scheduler: str | None, processes: int | 
             from distributed import Client
         except ImportError as error:
             raise RuntimeError("sweep: a scheduler needs pip install 'fringetrace[cluster]'") from error
-        with Client(scheduler) as client, client.get_executor() as cluster:
+        connect: Any = Client  # without types
+        with connect(scheduler) as client, client.get_executor() as cluster:
             yield cluster
     else:
         # a fork would copy the locks of threads that are not there
