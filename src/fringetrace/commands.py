@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
 Lines = list[tuple[str, str]]
 # Samples of a spectrum from 300 to 700 nm: one a nanometre.
 WAVELENGTHS = ("300 nm", "700 nm", "401")
-# Lengths of a lattice, which come with a unit; the rest are counts, numbers and names.
-LENGTHS = ("radius", "pitch", "spacing")
 FILES = ("brdf.nc", "brdf.csv", "spectra.png")
 
 
@@ -29,7 +26,7 @@ def brdf(
     *,
     unit: str,
     out: Path | None = None,
-    angles: tuple[str, str, str] = ("-60 deg", "60 deg", "7"),
+    angles: tuple[str, str] = ("60 deg", "7"),
     wavelengths: tuple[str, str, str] = WAVELENGTHS,
     acceptance: str = "0.64 deg",
     rays: tuple[int, int] = (1, 2000),
@@ -52,7 +49,7 @@ def brdf(
     out
         Folder to write to. Default: fringetrace-brdf-NAME, in this folder.
     angles
-        First and last angle in the x-z plane, of light and of observation, and how many.
+        Largest angle in the x-z plane, of light and of observation, and how many from minus to plus.
     wavelengths
         First, last, how many.
     acceptance
@@ -73,7 +70,7 @@ def brdf(
     from fringetrace.scene import Scene, Surface
 
     sample = meshes.load(mesh, unit=unit)
-    theta = _steps(angles, "--angles", parse_angle)
+    theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     detector: goniometer.Cells | goniometer.Cones = goniometer.Cones(
         theta, parse_angle(acceptance, "--acceptance")
     )
@@ -104,7 +101,7 @@ def lattice(
     arrangement: tuple[str, ...] = ("staggered",),
     disorder: tuple[float, ...] = (0.0,),
     seed: tuple[int, ...] = (0,),
-    angles: tuple[str, str, str] = ("-60 deg", "60 deg", "7"),
+    angles: tuple[str, str] = ("60 deg", "7"),
     wavelengths: tuple[str, str, str] = WAVELENGTHS,
     acceptance: str = "0.64 deg",
     rays: int = 2000,
@@ -143,12 +140,12 @@ def lattice(
         "columns": columns, "rows": rows, "radius": radius, "pitch": pitch, "arrangement": arrangement,
         "disorder": disorder, "seed": seed,
     }  # fmt: skip
-    for name in LENGTHS:
-        if name in given:
-            given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
+    spoken = dict(given)
+    for name in ("radius", "pitch"):
+        given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
     base = lattices.Lattice(**{name: values[0] for name, values in given.items()})
     axes = {name: values for name, values in given.items() if len(values) > 1}
-    theta = _steps(angles, "--angles", parse_angle)
+    theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     table = lattices.study(
         base, axes, theta, theta, _steps(wavelengths, "--wavelengths", parse_length), rays=rays,
         half_angle=parse_angle(acceptance, "--acceptance"), method=method,
@@ -157,9 +154,7 @@ def lattice(
     with measurement.staged(out) as part:
         _write(table, part)
     count = int(np.prod([len(values) for values in axes.values()]))
-    same = ", ".join(
-        f"{name} {value}" for name, value in asdict(base).items() if name in given and name not in axes
-    )
+    same = ", ".join(f"{name} {values[0]}" for name, values in spoken.items() if name not in axes)
     return [
         ("lattices", f"{count} of {', '.join(axes) or 'one kind'}; {same}"),
         *_powers(table),
@@ -171,7 +166,7 @@ def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
     """From first to last in equal steps."""
     first, last, count = given
     if not (count.isdigit() and int(count) > 0):
-        raise ValueError(f"{what}: expected first, last, and a whole number from 1, got {' '.join(given)!r}")
+        raise ValueError(f"{what}: expected a whole number from 1, got {count!r}")
     return np.linspace(parse(first, what), parse(last, what), int(count))
 
 

@@ -76,7 +76,7 @@ class Setup:
     Raises
     ------
     ValueError
-        If the aperture is no pair of positive lengths.
+        If the aperture is no pair of positive lengths, or the counts are not from 1.
     """
 
     scene: Scene
@@ -90,6 +90,8 @@ class Setup:
         size = tuple(high - low)[:2] if self.aperture is None else self.aperture
         width, height = (checked_length(side, "goniometer aperture") for side in size)
         object.__setattr__(self, "aperture", (width, height))
+        if len(self.rays) != 2 or not all(isinstance(n, (int, np.integer)) and n > 0 for n in self.rays):
+            raise ValueError(f"goniometer rays: expected two whole numbers from 1, got {self.rays!r}")
         middle = 0.5 * (low + high) if self.centre is None else self.centre
         object.__setattr__(self, "centre", np.asarray(middle, dtype=np.float64))
 

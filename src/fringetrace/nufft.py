@@ -15,7 +15,7 @@ TOLERANCE = 1e-12
 # finufft's errors are a few times what it is asked for; below this float64 gives no more.
 MARGIN, FINEST = 0.1, 1e-14
 # Up to so many exponentials, rays times wavelengths, these themselves are quicker.
-FEW = 2**13
+FEW = 2**11
 # Exponentials at a time, 32 MB.
 BLOCK = 2**21
 

@@ -152,7 +152,7 @@ def discs():
     circle = 5.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     surfaces = []
     for k, (x, z) in enumerate(((0.0, 0.0), (13.0, -4.0))):
-        tube = ft.shapes.extrude(circle + (x, z), 2.0, closed=True)
+        tube = ft.shapes.extrude(circle + np.array([x, z]), 2.0, closed=True)
         caps = np.ptp(tube.vertices[tube.faces][..., 1], axis=1) < 1e-12
         cylinder = ft.forms.Cylinder((x, 0, z), (0, 1, 0), 5.0)
         surfaces.append(
@@ -171,7 +171,7 @@ def come_down(scene, x):
 
 
 def test_two_discs():
-    """Every ray that leaves at one angle, by the discs that it met; their sum is that of geometrical optics."""
+    """Every ray that leaves at one angle, by the discs it met; their sum is that of geometrical optics."""
     scene, where = discs(), [(1.2, 1.4, 21), (4.0, 4.7, 1401), (9.3, 10.1, 1601), (14.2, 14.4, 21)]
     x = np.concatenate([np.linspace(*some) for some in where])
     names = [*DISCS, *LONG]
