@@ -17,7 +17,7 @@ ROOMS = {path.stem: ast.parse(path.read_text()) for path in Path(ft.__file__).pa
 MODULE = {"scikit-image": "skimage"}
 HEAVY = [
     "numba", "embreex", "trimesh", "prysm", "scipy", "skimage", "matplotlib", "pyvista", "vtk", "vtkmodules",
-    "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich", "PIL",
+    "finufft", "distributed", "dask", "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich", "PIL",
 ]  # fmt: skip
 
 
@@ -39,7 +39,9 @@ def room_map():
     return {room: {MODULE.get(name, name) for name in re.findall(r"[\w-]+", cell)} for room, cell in rows}
 
 
-@pytest.mark.parametrize("room", ["", ".scene", ".shapes", ".trace", ".phase", ".instruments"])
+@pytest.mark.parametrize(
+    "room", ["", ".scene", ".shapes", ".trace", ".phase", ".instruments", ".goniometer", ".commands"]
+)
 def test_importing_loads_nothing_heavy(room):
     code = f"import fringetrace{room}, sys; print(*sys.modules)"
     run = subprocess.run(

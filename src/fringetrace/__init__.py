@@ -22,7 +22,9 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, goniometer, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import (
+        forms, goniometer, instruments, lattices, meshes, phase, shapes, sweeps, vectors, views,
+    )  # fmt: skip
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -50,6 +52,7 @@ __all__ = [
     "goniometer",
     "instruments",
     "irradiance",
+    "lattices",
     "meshes",
     "mm",
     "mutual_intensity",
@@ -57,6 +60,7 @@ __all__ = [
     "phase",
     "shapes",
     "stream",
+    "sweeps",
     "trace",
     "um",
     "vectors",
@@ -64,7 +68,9 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "goniometer", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = (
+    "forms", "goniometer", "instruments", "lattices", "meshes", "phase", "shapes", "sweeps", "vectors", "views",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
