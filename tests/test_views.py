@@ -140,7 +140,8 @@ def test_spectra_have_a_panel_for_each_incidence():
     values = np.random.default_rng(1).uniform(size=(2, 3, 1, 4, 1, 5))
     coordinates = {
         "pitch": ("pitch", [2e-7, 3e-7]), "theta_i": ("theta_i", [-0.5, 0.0, 0.5]),
-        "theta_o": ("theta_o", [-0.3, -0.1, 0.1, 0.3]), "wavelength": ("wavelength", np.linspace(4e-7, 7e-7, 5)),
+        "theta_o": ("theta_o", [-0.3, -0.1, 0.1, 0.3]),
+        "wavelength": ("wavelength", np.linspace(4e-7, 7e-7, 5)),
     }  # fmt: skip
     figure = views.spectra(labels.labelled(values, axes, coordinates, "brdf", {}))
     panels = [ax for ax in figure.axes if ax.collections and ax.get_title()]

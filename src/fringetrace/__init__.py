@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fringetrace.bounds import Bounds, bounds
 from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
-from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.interfaces import Absorber, BeamSplitter, Dielectric, Metal, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -23,8 +23,24 @@ from fringetrace.waves import degree, mm, nm, um
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import (
-        forms, goniometer, instruments, lattices, meshes, phase, shapes, sweeps, vectors, views,
-    )  # fmt: skip
+        crystals,
+        elements,
+        films,
+        forms,
+        goniometer,
+        gratings,
+        instruments,
+        lattices,
+        materials,
+        meshes,
+        phase,
+        plates,
+        polarisers,
+        shapes,
+        sweeps,
+        vectors,
+        views,
+    )
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -34,11 +50,13 @@ __all__ = [
     "BeamSplitter",
     "Bounds",
     "Budget",
+    "Dielectric",
     "Fate",
     "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
+    "Metal",
     "Mirror",
     "Paths",
     "Rays",
@@ -47,17 +65,24 @@ __all__ = [
     "bounds",
     "budget",
     "complex_field",
+    "crystals",
     "degree",
+    "elements",
+    "films",
     "forms",
     "goniometer",
+    "gratings",
     "instruments",
     "irradiance",
     "lattices",
+    "materials",
     "meshes",
     "mm",
     "mutual_intensity",
     "nm",
     "phase",
+    "plates",
+    "polarisers",
     "shapes",
     "stream",
     "sweeps",
@@ -69,7 +94,8 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "forms", "goniometer", "instruments", "lattices", "meshes", "phase", "shapes", "sweeps", "vectors", "views",
+    "crystals", "elements", "films", "forms", "goniometer", "gratings", "instruments", "lattices",
+    "materials", "meshes", "phase", "plates", "polarisers", "shapes", "sweeps", "vectors", "views",
 )  # fmt: skip
 
 
