@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import degree, goniometer, nm, um
+from fringetrace import degree, farfield, goniometer, nm, um
 from fringetrace.goniometer import Cells, Cones, Pixels, amplitudes, brdf, reciprocity
 from fringetrace.guards import FringetraceWarning
 from fringetrace.lattices import Lattice
@@ -49,7 +49,7 @@ def test_threads_do_not_change_a_bit(rods):
 
 def test_chunks_add_up(rods, monkeypatch):
     whole = brdf(rods, THETA, Cones(THETA, 0.02), WAVES, rays=(1, 300))
-    monkeypatch.setattr(goniometer, "CHUNK", 70)
+    monkeypatch.setattr(farfield, "CHUNK", 70)
     parts = brdf(rods, THETA, Cones(THETA, 0.02), WAVES, rays=(1, 300))
     assert parts.values == pytest.approx(whole.values, rel=1e-10, abs=1e-10 * whole.values.max())
     assert parts.reflected.values == pytest.approx(whole.reflected.values, rel=1e-12)
@@ -135,3 +135,25 @@ def test_reciprocity_needs_a_square_table():
     table = brdf(mirror(), 0.0, Cones(THETA, 0.01), WAVES, rays=(2, 2))
     with pytest.raises(ValueError, match="reciprocity: expected the same angles on both sides, got shape"):
         reciprocity(table)
+
+
+def test_glass_in_a_medium():
+    """A dispersive face in water, straight on: Fresnel's |r|^2 at each wavelength, n h of path to it."""
+    glass, water, height = ft.materials.named("N-BK7"), ft.materials.named("water"), 1 * um
+    sheet = ft.shapes.plate(20 * um, 20 * um)
+    scene = ft.Scene([ft.Surface(sheet, ft.Dielectric(), back=glass)], medium=water)
+    given = {"wavelengths": WAVES, "rays": (2, 2)}
+    power = brdf(scene, 0.0, Cones([0.0], 0.01), method="power", **given)
+    n, m = (medium.index(WAVES).real for medium in (water, glass))
+    r = (n - m) / (n + m)
+    assert power.values.ravel() * np.pi * np.sin(0.01) ** 2 == pytest.approx(r**2, rel=1e-12)
+    assert power.transmitted.item() == pytest.approx(1.0 - np.mean(r**2), rel=1e-12)
+    sums = amplitudes(scene, 0.0, Cones([0.0], 0.01), centre=(0, 0, height), **given)
+    truth = 400 * um * um * r * np.exp(4j * np.pi / WAVES * n * height)
+    assert sums.values.ravel() == pytest.approx(truth, rel=1e-9)
+
+
+def test_polarised_light_is_refused():
+    beam = ft.Beam((0, 0, 1e-4), (0, 0, -1), (0, 1, 0), (1e-5, 1e-5), (2, 2), polarisation=(1, 0))
+    with pytest.raises(ValueError, match="goniometer: expected light without polarisation"):
+        brdf(mirror(), 0.0, Cones([0.0], 0.01), WAVES, source=lambda theta, phi: beam)

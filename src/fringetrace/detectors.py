@@ -114,7 +114,10 @@ def far_lengths(paths: Paths, rows: IndexArray, centre: FloatArray, direction: F
     -------
     (n,) float64, metres
     """
-    return np.asarray(paths.length[rows] - (paths.origin[rows] - centre) @ direction, dtype=np.float64)
+    ahead = (paths.origin[rows] - centre) @ direction
+    if paths.index is not None:
+        ahead *= paths.index[rows]
+    return np.asarray(paths.length[rows] - ahead, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.detectors import Cells, Cones, Detector, Pixels, checked_angles, everything
+from fringetrace.detectors import Cells, Cones, Detector, Pixels, checked_angles
+from fringetrace.farfield import FATES, Far, far_field
 from fringetrace.guards import FringetraceWarning
 from fringetrace.illumination import Setup, Source, footprint
 from fringetrace.labels import labelled
-from fringetrace.nufft import TOLERANCE, checked_wavelengths, spectrum
-from fringetrace.paths import Fate, Paths
+from fringetrace.nufft import checked_wavelengths
 from fringetrace.scene import Scene
-from fringetrace.trace import stream
-from fringetrace.waves import ComplexArray, FloatArray
+from fringetrace.waves import FloatArray
 
 if TYPE_CHECKING:
     from fringetrace.labels import DataArray
@@ -37,103 +35,8 @@ __all__ = [
 
 METHODS = ("rays", "diffraction", "power")
 AXES = ("theta_i", "phi_i", "theta_o", "phi_o", "wavelength")
-FATES = ("reflected", "transmitted", "missed", "absorbed", "truncated")
-# Rays whose sums are taken at once: 100 MB of paths.
-CHUNK = 2**17
 
 Incidence = npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]
-
-
-@dataclass(frozen=True, eq=False)
-class Far:
-    """What left a sample that was lit from one direction.
-
-    Attributes
-    ----------
-    amplitude : (theta, phi, wavelength) complex128, m^2 (rays, where they have no area)
-        Sum of area * amplitude * exp(i k length) over the rays that arrive.
-    power : (theta, phi) float64, m^2 (rays)
-        Sum of area * |amplitude|^2 over them.
-    rays : (theta, phi) int64
-        Their number.
-    shares : dict
-        Parts of the incident power by what became of it, see `FATES`.
-    incident : float, m^2 (rays)
-    """
-
-    amplitude: ComplexArray
-    power: FloatArray
-    rays: npt.NDArray[np.int64]
-    shares: dict[str, float]
-    incident: float
-
-
-def _shares(paths: Paths) -> FloatArray:
-    """Power by fate, in the order of `FATES`."""
-    power, left, met = np.abs(paths.amplitude) ** 2, paths.fate == Fate.LEFT, paths.bounces > 0
-    up = paths.direction[:, 2] > 0.0
-    ledger = paths.ledger()
-    unit = 1.0 if paths.area is None else paths.area
-    sums = [unit * power[left & which].sum() for which in (met & up, met & ~up, ~met)]
-    return np.array([*sums, ledger.absorbed, ledger.truncated])
-
-
-def far_field(
-    setup: Setup,
-    theta: float,
-    phi: float,
-    detector: Detector,
-    wavelengths: npt.ArrayLike,
-    *,
-    method: str = "rays",
-    chosen: npt.NDArray[np.bool_] | None = None,
-    max_bounces: int = 100,
-    max_reflections: int | None = None,
-    half_wave_loss: bool = True,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
-) -> Far:
-    """Trace one incidence, and sum what arrives at a detector.
-
-    Parameters
-    ----------
-    setup : Setup
-    theta, phi : float, radians
-        Where the light comes from.
-    detector : Cones, Cells or Pixels
-    wavelengths : (w,) float64, metres
-    method, max_bounces, max_reflections, half_wave_loss, tolerance, threads
-        See `brdf`.
-    chosen : (theta, phi) bool, optional
-        The directions whose amplitudes are wanted; the others stay 0. Default: all.
-
-    Returns
-    -------
-    Far
-    """
-    waves, size = checked_wavelengths(wavelengths), (len(detector.theta), len(detector.phi))
-    wanted = np.ones(size, dtype=bool) if chosen is None else chosen
-    total = np.zeros((wanted.size, len(waves)), dtype=np.complex128)
-    power, count = np.zeros(wanted.size), np.zeros(wanted.size, dtype=np.int64)
-    shares, incident = np.zeros(len(FATES)), 0.0
-    source, centre = setup.light(theta, phi), np.asarray(setup.centre)
-    start = 0.0 if isinstance(detector, Pixels) else setup.start(source)
-    for paths in stream(setup.scene, source, max_bounces=max_bounces, threads=threads, chunk=CHUNK):
-        shares, incident = shares + _shares(paths), incident + paths.ledger().incident
-        unit = 1.0 if paths.area is None else paths.area
-        most = paths if max_reflections is None else paths.where(paths.reflections <= max_reflections)
-        arrivals = everything(most, detector, centre) if method == "diffraction" \
-            else detector.arrivals(most, centre)  # fmt: skip
-        for i, (rows, length) in enumerate(arrivals):
-            amplitude = most.amplitude[rows]
-            count[i] += len(rows)
-            power[i] += unit * (np.abs(amplitude) ** 2).sum()
-            if method != "power" and wanted.flat[i] and len(rows):
-                if not half_wave_loss:
-                    amplitude = np.where(most.reflections[rows] % 2 == 1, -amplitude, amplitude)
-                total[i] += unit * spectrum(length - start, amplitude, waves, tolerance)
-    parts = dict(zip(FATES, (shares / incident).tolist(), strict=True))
-    return Far(total.reshape(*size, -1), power.reshape(size), count.reshape(size), parts, incident)
 
 
 def _angles(incidence: Incidence) -> tuple[FloatArray, FloatArray]:
@@ -169,7 +72,7 @@ def _density(far: Far, detector: Detector, waves: FloatArray, method: str) -> Fl
     """(theta, phi, wavelength) float64, 1/sr: power a projected solid angle, over the incident one."""
     projected = detector.projected[..., None]
     if method == "power":
-        density = np.repeat(far.power[..., None] / projected, len(waves), axis=2)
+        density = far.power / projected
     elif isinstance(detector, Pixels):
         density = np.abs(far.amplitude) ** 2 / (detector.width**2 * projected)
     else:
@@ -248,7 +151,8 @@ def brdf(
 ) -> DataArray:
     """Bidirectional reflectance distribution function, radiance over incident irradiance.
 
-    One trace an incidence serves all directions and all wavelengths. Light that meets nothing is left
+    One trace an incidence serves all directions and all wavelengths; where media are dispersive, absorb,
+    or have films, it is one trace a wavelength. Light that meets nothing is left
     out of the BRDF, but not of the incident power: the aperture is the sample.
 
     Parameters
@@ -295,7 +199,7 @@ def brdf(
     ------
     ValueError
         For angles, wavelengths or lengths out of range, an unknown method, "diffraction" onto pixels,
-        or `reciprocal` without the same angles on both sides.
+        polarised light, or `reciprocal` without the same angles on both sides.
 
     Notes
     -----

@@ -119,12 +119,14 @@ class Setup:
         reach = float(np.linalg.norm(high - low) + np.hypot(*self.aperture))
         return footprint(theta, phi, self.aperture, self.rays, np.asarray(self.centre), reach)
 
-    def start(self, source: Beam | Rays) -> float:
+    def start(self, source: Beam | Rays, wavelength: float | None = None) -> float:
         """Optical path of parallel light from its start to the plane through the centre, across it.
 
         Parameters
         ----------
         source : Beam or Rays
+        wavelength : float, metres, optional
+            Needed where the medium around is dispersive.
 
         Returns
         -------
@@ -133,4 +135,5 @@ class Setup:
         first = launch(source, 0, 1) if isinstance(source, Beam) else source.part(0, 1)
         assert first.length is not None
         way = (np.asarray(self.centre) - first.origin[0]) @ first.direction[0]
-        return float(first.length[0] + way)
+        index = 1.0 if self.scene.medium is None else self.scene.medium.index(wavelength or 1.0).real
+        return float(first.length[0] + index * way)

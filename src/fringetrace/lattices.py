@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.detectors import Cones, checked_angles
-from fringetrace.goniometer import AXES, FATES, brdf
+from fringetrace.farfield import FATES
+from fringetrace.goniometer import AXES, brdf
 from fringetrace.interfaces import Mirror
 from fringetrace.labels import labelled
 from fringetrace.mesh import Mesh
