@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
@@ -133,7 +134,7 @@ def study(
     method: str = "rays",
     rays: int = 2000,
     max_bounces: int = 100,
-    folder: str | None = None,
+    folder: str | os.PathLike[str] | None = None,
     **sweeping: Any,
 ) -> DataArray:
     """BRDF of many lattices in the plane across their rods.
