@@ -12,11 +12,11 @@ from fringetrace.outlines import cut
 from fringetrace.paths import Paths
 from fringetrace.probes import RIM, profile
 from fringetrace.quadrature import Samples
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, Surface
 from fringetrace.sheets import landed
 from fringetrace.squares import CORNERS, Pieces, Squares
 from fringetrace.survey import Survey
-from fringetrace.vectors import frame
+from fringetrace.vectors import frame, unit
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 
@@ -66,28 +66,31 @@ class Region:
     segments: FloatArray
 
 
-def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
-    """The plane wave that a ray belongs to: what its reflections make of a step across the beam."""
+def _met(paths: Paths, row: int) -> list[tuple[Surface, FloatArray]]:
+    """The surfaces that a path met, and the normals (3,) of their facets there."""
     assert paths.surface is not None
     assert paths.triangle is not None
+    count = paths.bounces[row]
+    surfaces = [paths.scene.surfaces[number] for number in paths.surface[row, :count]]
+    corners = np.empty((count, 3, 3))
+    for k, (surface, face) in enumerate(zip(surfaces, paths.triangle[row, :count], strict=True)):
+        corners[k] = surface.mesh.vertices[surface.mesh.faces[face]]
+    normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return list(zip(surfaces, normals, strict=True))
+
+
+def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
+    """The plane wave that a ray belongs to: what its reflections make of a step across the beam."""
     assert paths.points is not None
-    u, v, n = frame(beam.direction, beam.up, "Beam")
+    u, v, direction = frame(beam.direction, beam.up, "Beam")
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
-    direction = n
-    bounces = int(paths.bounces[row])
-    points = paths.points[row]
-    for bounce in range(bounces):
-        mesh = paths.scene.surfaces[paths.surface[row, bounce]].mesh
-        a, b, c = mesh.vertices[mesh.faces[paths.triangle[row, bounce]]]
-        normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal)
-        onward = paths.direction[row]
-        if bounce + 1 < bounces:
-            onward = points[bounce + 2] - points[bounce + 1]
-            onward = onward / np.linalg.norm(onward)
-        turned = direction - 2.0 * (direction @ normal) * normal
-        if np.linalg.norm(onward - turned) < np.linalg.norm(onward - direction):
-            direction = turned
+    legs = np.diff(paths.points[row, 1 : paths.bounces[row] + 1], axis=0)
+    onward = np.concatenate([legs, paths.direction[row, None]])
+    for (surface, normal), leaving in zip(_met(paths, row), onward, strict=False):
+        facing = direction @ normal
+        # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
+        if surface.interface.transmission == 0.0 or facing * (leaving @ normal) < 0.0:
+            direction = direction - 2.0 * facing * normal
             across = across - 2.0 * np.outer(normal, normal @ across)
     right, up, facing = frame(ccd.normal, ccd.up, "CCD")
     # along the rays into the plane of focus
