@@ -164,7 +164,7 @@ def test_the_demo_comes_back_within_a_thousandth_of_a_wave(tmp_path):
 @pytest.mark.skipif("FRINGETRACE_DATA" not in os.environ, reason="needs the folder FRINGETRACE_DATA")
 def test_a_measured_surface_goes_through_like_any_mesh(command, tmp_path):
     file = Path(os.environ["FRINGETRACE_DATA"], "metropro-1.dat")
-    code, said, errors = command("interferogram", file, "--out", tmp_path, "--pixels", "128", "--no-picture")
+    code, said, errors = command("interferogram", file, "--out", tmp_path, "--no-picture")
     assert (code, errors) == (0, "")
     assert "metropro-1.dat" in said
     with xarray.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as data:
