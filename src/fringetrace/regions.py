@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.contacts import indices
+from fringetrace.interfaces import refracted
 from fringetrace.outlines import cut
 from fringetrace.paths import Paths
 from fringetrace.probes import RIM, profile
@@ -80,18 +82,29 @@ def _met(paths: Paths, row: int) -> list[tuple[Surface, FloatArray]]:
 
 
 def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
-    """The plane wave that a ray belongs to: what its reflections make of a step across the beam."""
+    """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
     u, v, direction = frame(beam.direction, beam.up, "Beam")
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
     legs = np.diff(paths.points[row, 1 : paths.bounces[row] + 1], axis=0)
     onward = np.concatenate([legs, paths.direction[row, None]])
-    for (surface, normal), leaving in zip(_met(paths, row), onward, strict=False):
-        facing = direction @ normal
+    index = indices(paths.where(np.array([row])))[0]
+    for k, (surface, normal) in enumerate(_met(paths, row)):
+        leaving = onward[k] / np.linalg.norm(onward[k])
+        turned = direction - 2.0 * (direction @ normal) * normal
+        bent = refracted(direction, normal, index[k], index[k + 1])
+        if hasattr(surface.interface, "act"):
+            bent = leaving
         # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
-        if surface.interface.transmission == 0.0 or facing * (leaving @ normal) < 0.0:
-            direction = direction - 2.0 * facing * normal
+        mirror = getattr(surface.interface, "transmission", None) == 0.0
+        # NaN where light is totally reflected
+        if mirror or not np.linalg.norm(leaving - bent) <= np.linalg.norm(leaving - turned):
             across = across - 2.0 * np.outer(normal, normal @ across)
+            direction = turned
+        elif bent is not direction:
+            # the step along the surface is the same on both sides
+            across = across - np.outer(direction, (normal @ across) / (normal @ direction))
+            direction = bent
     right, up, facing = frame(ccd.normal, ccd.up, "CCD")
     # along the rays into the plane of focus
     across = across - np.outer(direction, (facing @ across) / (facing @ direction))
@@ -106,7 +119,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
         matrix=matrix,
         start=start,
         path=float(length[0]),
-        gradient=np.array([direction @ right, direction @ up]) * ccd.pitch,
+        gradient=index[-1] * np.array([direction @ right, direction @ up]) * ccd.pitch,
         amplitude=complex(paths.amplitude[row]) * size,
     )
 

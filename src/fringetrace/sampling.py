@@ -148,7 +148,7 @@ def centred(paths: Paths, parts: int = 1) -> Paths:
     u, v, _ = paths.ccd.axes
     fine = paths.pixel * parts
     shift = (np.floor(fine) + 0.5 - fine) * (paths.ccd.pitch / parts)
-    continued = shift[:, 0] * (paths.direction @ v) + shift[:, 1] * (paths.direction @ u)
+    continued = shift[:, 0] * (paths.gradient @ v) + shift[:, 1] * (paths.gradient @ u)
     return replace(paths, length=paths.length + continued)
 
 
@@ -171,7 +171,7 @@ def spread(paths: Paths, wavelength: float) -> Paths:
     assert paths.ccd is not None
     assert paths.area is not None
     parts = max(1, round(paths.ccd.pitch / math.sqrt(paths.area)))
-    cycles = paths.direction @ np.transpose(paths.ccd.axes[:2]) * (paths.ccd.pitch / parts / wavelength)
+    cycles = paths.gradient @ np.transpose(paths.ccd.axes[:2]) * (paths.ccd.pitch / parts / wavelength)
     mean = np.sinc(cycles).prod(axis=1)
     return replace(centred(paths, parts), amplitude=paths.amplitude * mean)
 
