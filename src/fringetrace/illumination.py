@@ -11,8 +11,7 @@ import numpy.typing as npt
 from fringetrace.detectors import towards
 from fringetrace.rays import Rays, launch
 from fringetrace.scene import Beam, Scene
-from fringetrace.shapes import checked_length
-from fringetrace.waves import FloatArray
+from fringetrace.waves import FloatArray, checked_length
 
 Source = Callable[[float, float], Beam | Rays]
 

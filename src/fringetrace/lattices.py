@@ -18,9 +18,9 @@ from fringetrace.labels import labelled
 from fringetrace.mesh import Mesh
 from fringetrace.nufft import checked_wavelengths
 from fringetrace.scene import Scene, Surface
-from fringetrace.shapes import checked_length, rod_lattice
+from fringetrace.shapes import rod_lattice
 from fringetrace.sweeps import grid, sweep
-from fringetrace.waves import FloatArray, degree
+from fringetrace.waves import FloatArray, checked_length, degree
 
 if TYPE_CHECKING:
     from fringetrace.labels import DataArray
