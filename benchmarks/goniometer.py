@@ -18,7 +18,7 @@ import pages
 
 import fringetrace as ft
 from fringetrace import degree, goniometer, nm, nufft, um
-from fringetrace.lattices import Lattice
+from fringetrace.studies import Lattice
 
 ROUNDS = 3
 THETA = np.arange(-60, 61, 20) * degree

@@ -8,7 +8,7 @@ import xarray
 
 import fringetrace as ft
 from fringetrace import cli, commands, sweeps
-from fringetrace.lattices import Lattice
+from fringetrace.studies import Lattice
 
 SHORT = ["--angles", "20 deg", "2", "--wavelengths", "400 nm", "600 nm", "5"]
 

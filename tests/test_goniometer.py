@@ -7,7 +7,7 @@ import fringetrace as ft
 from fringetrace import degree, farfield, goniometer, nm, um
 from fringetrace.goniometer import Cells, Cones, Pixels, amplitudes, brdf, reciprocity
 from fringetrace.guards import FringetraceWarning
-from fringetrace.lattices import Lattice
+from fringetrace.studies import Lattice
 
 WAVES = np.array([400, 500, 650]) * nm
 THETA = np.array([-20, 0, 20]) * degree

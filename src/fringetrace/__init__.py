@@ -30,13 +30,13 @@ if TYPE_CHECKING:
         goniometer,
         gratings,
         instruments,
-        lattices,
         materials,
         meshes,
         phase,
         plates,
         polarisers,
         shapes,
+        studies,
         sweeps,
         vectors,
         views,
@@ -74,7 +74,6 @@ __all__ = [
     "gratings",
     "instruments",
     "irradiance",
-    "lattices",
     "materials",
     "meshes",
     "mm",
@@ -85,6 +84,7 @@ __all__ = [
     "polarisers",
     "shapes",
     "stream",
+    "studies",
     "sweeps",
     "trace",
     "um",
@@ -94,7 +94,7 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "crystals", "elements", "films", "forms", "goniometer", "gratings", "instruments", "lattices",
+    "crystals", "elements", "films", "forms", "goniometer", "gratings", "instruments", "studies",
     "materials", "meshes", "phase", "plates", "polarisers", "shapes", "sweeps", "vectors", "views",
 )  # fmt: skip
 

@@ -134,7 +134,7 @@ def lattice(
     scheduler
         Address of a Dask scheduler. Default: this machine's cores.
     """
-    from fringetrace import lattices, measurement
+    from fringetrace import measurement, studies
 
     given: dict[str, Any] = {
         "columns": columns, "rows": rows, "radius": radius, "pitch": pitch, "arrangement": arrangement,
@@ -143,10 +143,10 @@ def lattice(
     spoken = dict(given)
     for name in ("radius", "pitch"):
         given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
-    base = lattices.Lattice(**{name: values[0] for name, values in given.items()})
+    base = studies.Lattice(**{name: values[0] for name, values in given.items()})
     axes = {name: values for name, values in given.items() if len(values) > 1}
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
-    table = lattices.study(
+    table = studies.study(
         base, axes, theta, theta, _steps(wavelengths, "--wavelengths", parse_length), rays=rays,
         half_angle=parse_angle(acceptance, "--acceptance"), method=method,
         folder=os.fspath(out / "cells"), scheduler=scheduler,

@@ -286,7 +286,7 @@ def spectra(table: DataArray, columns: int = 4) -> Figure:
     Parameters
     ----------
     table : xarray.DataArray
-        As from `goniometer.brdf` (phi taken at the first value), or `lattices.study`.
+        As from `goniometer.brdf` (phi taken at the first value), or `studies.study`.
     columns : int
         Panels side by side.
 

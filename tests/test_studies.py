@@ -9,7 +9,7 @@ import xarray
 import fringetrace as ft
 from fringetrace import degree, nm
 from fringetrace.goniometer import Cones, brdf
-from fringetrace.lattices import Lattice, study
+from fringetrace.studies import Lattice, study
 
 WAVES = np.linspace(400, 600, 5) * nm
 THETA = np.array([-20, 20]) * degree
