@@ -9,7 +9,8 @@ import numpy as np
 from fringetrace.harmonics import waves
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
-_DENSE = 400  # unknowns below which elimination is as quick as iteration
+_DENSE = 400  # unknowns up to which elimination is as quick as iteration
+_FEW = 16  # centres that are never taken for a lattice
 _LARGEST = 6000  # unknowns whose matrix (600 MB) may still be eliminated
 _RESIDUAL = 1e-12  # relative, at which iteration ends
 _ON_GRID = 1e-9  # of a step, that centres may be off their grid by rounding
@@ -45,8 +46,8 @@ def solve(
     if len(centres) == 1:
         return incident
     right, sources = incident / weight, response * weight
-    grid = _grid(centres)
-    if right[0].size > _DENSE and grid is not None:
+    grid = _grid(centres) if right[0].size > _DENSE and len(centres) > _FEW else None
+    if grid is not None:
         found = [_iterate(_convolution(grid, k, weight, sources), each) for each in right]
         if all(each is not None for each in found):
             return np.stack(found) * weight
@@ -91,12 +92,15 @@ def _convolution(
 ) -> Callable[[ComplexArray], ComplexArray]:
     """The map a -> a - G S a on a grid, where G is a convolution (FFT), in scaled unknowns."""
     from scipy import fft
+    from scipy.spatial import cKDTree
 
     (places, steps), count = grid, weight.shape[-1]
-    shape = 2 * places.max(0) + 1
+    shape = [fft.next_fast_len(2 * int(most) + 1) for most in places.max(0)]
     lags = [np.arange(s) - s * (np.arange(s) > s // 2) for s in shape]
-    lag = np.stack(np.meshgrid(*lags, indexing="ij"), -1)
-    kernel = fft.fft2(waves(lag * steps, k, count - 1), axes=(0, 1))
+    nearest = (1.0 - _ON_GRID) * cKDTree(places * steps).query(places * steps, 2)[0][:, 1].min()
+    lag = np.stack(np.meshgrid(*lags, indexing="ij"), -1) * steps
+    lag[np.hypot(*np.moveaxis(lag, -1, 0)) < nearest] = 0.0  # between places of which one is empty
+    kernel = fft.fft2(waves(lag, k, count - 1), axes=(0, 1))
     order = np.arange(count)
     kernel = np.ascontiguousarray(kernel[..., order - order[:, None] + count - 1])
     at = tuple(places.T)

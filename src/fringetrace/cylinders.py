@@ -23,6 +23,8 @@ from numpy.typing import ArrayLike
 from fringetrace.coupling import solve
 from fringetrace.harmonics import (
     CONDUCTOR as CONDUCTOR,
+)
+from fringetrace.harmonics import (
     Index,
     Polarisation,
     at_wavelength,
@@ -270,10 +272,11 @@ def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     k, cylinders = scattered.wavenumber, scattered.cylinders
+    centres, radii = np.asarray(cylinders.centres), np.asarray(cylinders.radii)
     along = np.stack([np.cos(scattered.angle), np.sin(scattered.angle)])
     found = np.exp(1j * k * (points @ along)).T
     inside = np.full(len(points), -1)
-    for j, (centre, radius) in enumerate(zip(np.asarray(cylinders.centres), np.asarray(cylinders.radii))):
+    for j, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
         offset = points - centre
         distance, azimuth = np.hypot(*offset.T), np.arctan2(offset[:, 1], offset[:, 0])
         within = distance < radius
@@ -338,7 +341,8 @@ def _check_apart(centres: FloatArray, radii: FloatArray) -> None:
     if np.any(gap < 0):
         worst = gap.argmin()
         raise ValueError(
-            f"Cylinders: expected them apart, got {i[worst]} and {j[worst]} overlapping by {-gap[worst]:.3g} m"
+            f"Cylinders: expected them apart, got {i[worst]} and {j[worst]} "
+            f"overlapping by {-gap[worst]:.3g} m"
         )
 
 

@@ -121,7 +121,7 @@ def waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
     distance = np.hypot(displacement[..., 0], displacement[..., 1])
     here = distance == 0.0
     azimuth = np.arctan2(displacement[..., 1], displacement[..., 0])
-    wave = hankel(k * np.where(here, 1.0 / k, distance), orders)
+    wave = hankel(np.where(here, orders + 1.0, k * distance), orders)  # of anything finite, here
     wave *= np.exp(1j * azimuth[..., None] * np.arange(-orders, orders + 1))
     wave[here] = 0.0
     return wave

@@ -18,10 +18,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.harmonics import Index, Polarisation, at_wavelength, boundary, lattice_sums, truncation
+from fringetrace.harmonics import (
+    Index,
+    Polarisation,
+    at_wavelength,
+    boundary,
+    check_polarisation,
+    lattice_sums,
+    truncation,
+)
+from fringetrace.multilayers import Powers, effective_index, stack
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
-
+_SLICES = 64  # flat layers a pitch, of method "multilayer"
 _GRAZING = 1e-7  # of k: wavenumbers across the rows are kept this far from zero, where sums diverge
 
 
@@ -77,9 +86,8 @@ class Lattice:
 
     def __post_init__(self) -> None:
         if not (self.pitch > 0 and self.thickness > 0):
-            raise ValueError(
-                f"Lattice: expected positive lengths in metres, got pitch {self.pitch}, thickness {self.thickness}"
-            )
+            lengths = f"pitch {self.pitch}, thickness {self.thickness}"
+            raise ValueError(f"Lattice: expected positive lengths in metres, got {lengths}")
         rows = tuple(sorted(self.rows, key=lambda row: row.depth))
         for row in rows:
             if not 0 < row.radius <= self.pitch / 2:
@@ -152,6 +160,7 @@ def diffract(
     angle : float or array, radians
         Of incidence, in the front medium.
     polarisation : ``"E"`` or ``"H"``
+        The field along the cylinders.
     orders : int, optional
         Highest diffraction order G; by default those that propagate and 4 more, on either side.
     harmonics : int, optional
@@ -160,7 +169,13 @@ def diffract(
     Returns
     -------
     Diffraction
+
+    Raises
+    ------
+    ValueError
+        If a wavelength is not positive, the polarisation unknown, or front or host absorb.
     """
+    check_polarisation(polarisation)
     wavelength, angle = np.broadcast_arrays(np.asarray(wavelength, np.float64), np.asarray(angle, np.float64))
     front, host, back = _media(lattice, wavelength)
     vacuum = 2.0 * math.pi / wavelength
@@ -189,8 +204,71 @@ def diffract(
     )  # fmt: skip
 
 
+def spectrum(
+    lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike = 0.0, polarisation: str = "unpolarised",
+    method: str = "rods",
+) -> Powers:  # fmt: skip
+    """Reflectance and transmittance of a lattice, all diffraction orders together.
+
+    Parameters
+    ----------
+    lattice : Lattice
+    wavelength : float or array, metres
+        In vacuum; broadcasts with `angle`.
+    angle : float or array, radians
+        Of incidence, in the front medium.
+    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
+        The last is the mean of the two others.
+    method : ``"rods"`` or ``"multilayer"``
+        Rigorous, or flat layers of effective index: quicker, without diffraction orders, some 5 % off.
+
+    Returns
+    -------
+    Powers
+
+    Raises
+    ------
+    ValueError
+        If the method or the polarisation is unknown.
+    """
+    if polarisation == "unpolarised":
+        both = [spectrum(lattice, wavelength, angle, each, method) for each in ("E", "H")]
+        return Powers(*(sum(each) / 2.0 for each in zip(*both, strict=True)))
+    check_polarisation(polarisation)
+    if method == "multilayer":
+        return _blurred(lattice, wavelength, angle, polarisation)
+    if method != "rods":
+        raise ValueError(f"Method: expected 'rods' or 'multilayer', got {method!r}")
+    found = diffract(lattice, wavelength, angle, polarisation)
+    return Powers(found.reflectance.sum(-1), found.transmittance.sum(-1))
+
+
+def _blurred(lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike, polarisation: Polarisation) -> Powers:
+    """Powers of the lattice as a stack of thin flat layers of effective index."""
+    wavelength, angle = np.broadcast_arrays(np.asarray(wavelength, np.float64), np.asarray(angle, np.float64))
+    front, host, back = _media(lattice, wavelength)
+    faces = np.linspace(0.0, lattice.thickness, math.ceil(_SLICES * lattice.thickness / lattice.pitch) + 1)
+    fractions = [_filling(row, lattice.pitch, faces) for row in lattice.rows]
+    fractions.append(1.0 - np.sum(fractions, 0) * np.ones(len(faces) - 1))
+    indices = [*(at_wavelength(row.index, wavelength) for row in lattice.rows), host]
+    if not np.all(np.isfinite(indices)):
+        raise ValueError("Method 'multilayer': expected finite refractive indices, got a perfect conductor")
+    mixed = effective_index(np.stack(fractions, -1), np.stack(indices, -1)[..., None, :], polarisation)
+    return stack(np.diff(faces), mixed, front, back, wavelength, angle, polarisation)
+
+
+def _filling(row: Row, pitch: float, faces: FloatArray) -> FloatArray:
+    """Area fraction of a row's cylinders between neighbouring depths (s + 1,): (s,)."""
+    u = np.clip((faces - row.depth) / row.radius, -1.0, 1.0)
+    area = row.radius**2 * (u * np.sqrt(1.0 - u**2) + np.arcsin(u))
+    found: FloatArray = np.diff(area) / (pitch * np.diff(faces))
+    return found
+
+
 def _media(lattice: Lattice, wavelength: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Index of front, host and back at each wavelength."""
+    if not np.all(wavelength > 0):
+        raise ValueError(f"Wavelength: expected positive lengths in metres, got {wavelength.min()}")
     back = lattice.host if lattice.back is None else lattice.back
     front, host, back = (at_wavelength(index, wavelength) for index in (lattice.front, lattice.host, back))
     for name, index in (("Front", front), ("Host", host)):
