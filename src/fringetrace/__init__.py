@@ -18,11 +18,23 @@ from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
 from fringetrace.scene import CCD, Beam, Gaussian, Scene, Surface
 from fringetrace.trace import stream, trace
+from fringetrace.validity import Validity, validity
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import (
+        cylinders,
+        forms,
+        instruments,
+        lattices,
+        meshes,
+        phase,
+        shapes,
+        spheres,
+        vectors,
+        views,
+    )
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -42,28 +54,44 @@ __all__ = [
     "Rays",
     "Scene",
     "Surface",
+    "Validity",
     "bounds",
     "budget",
     "complex_field",
+    "cylinders",
     "degree",
     "forms",
     "instruments",
     "irradiance",
+    "lattices",
     "meshes",
     "mm",
     "mutual_intensity",
     "nm",
     "phase",
     "shapes",
+    "spheres",
     "stream",
     "trace",
     "um",
+    "validity",
     "vectors",
     "views",
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = (
+    "cylinders",
+    "forms",
+    "instruments",
+    "lattices",
+    "meshes",
+    "phase",
+    "shapes",
+    "spheres",
+    "vectors",
+    "views",
+)
 
 
 def __getattr__(name: str) -> Any:

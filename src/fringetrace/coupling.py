@@ -48,8 +48,9 @@ def solve(
     right, sources = incident / weight, response * weight
     grid = _grid(centres) if right[0].size > _DENSE and len(centres) > _FEW else None
     if grid is not None:
-        found = [_iterate(_convolution(grid, k, weight, sources), each) for each in right]
-        if all(each is not None for each in found):
+        system = _convolution(grid, k, weight, sources)
+        found = [each for each in (_iterate(system, one) for one in right) if each is not None]
+        if len(found) == len(right):
             return np.stack(found) * weight
     if right[0].size > _LARGEST:
         raise ValueError(
@@ -57,7 +58,8 @@ def solve(
             f"({len(centres)} cylinders of {response.shape[-1]} orders)"
         )
     matrix = np.eye(right[0].size) - _coupling(centres, k, weight, sources)
-    return np.linalg.solve(matrix, right.reshape(len(right), -1).T).T.reshape(right.shape) * weight
+    solved = np.linalg.solve(matrix, right.reshape(len(right), -1).T).T
+    return np.asarray(solved.reshape(right.shape) * weight, np.complex128)
 
 
 def _coupling(centres: FloatArray, k: float, weight: FloatArray, sources: ComplexArray) -> ComplexArray:
@@ -97,7 +99,8 @@ def _convolution(
     (places, steps), count = grid, weight.shape[-1]
     shape = [fft.next_fast_len(2 * int(most) + 1) for most in places.max(0)]
     lags = [np.arange(s) - s * (np.arange(s) > s // 2) for s in shape]
-    nearest = (1.0 - _ON_GRID) * cKDTree(places * steps).query(places * steps, 2)[0][:, 1].min()
+    apart = np.asarray(cKDTree(places * steps).query(places * steps, 2)[0])[:, 1]
+    nearest = (1.0 - _ON_GRID) * apart.min()
     lag = np.stack(np.meshgrid(*lags, indexing="ij"), -1) * steps
     lag[np.hypot(*np.moveaxis(lag, -1, 0)) < nearest] = 0.0  # between places of which one is empty
     kernel = fft.fft2(waves(lag, k, count - 1), axes=(0, 1))
@@ -109,7 +112,7 @@ def _convolution(
         field = np.zeros((*shape, count), np.complex128)
         field[at] = sources * unknown.reshape(weight.shape)
         met = fft.ifft2((kernel @ fft.fft2(field, axes=(0, 1))[..., None])[..., 0], axes=(0, 1))
-        return unknown - (met[at] / weight).ravel()
+        return np.asarray(unknown - (met[at] / weight).ravel())
 
     return residual
 
@@ -120,4 +123,4 @@ def _iterate(system: Callable[[ComplexArray], ComplexArray], right: ComplexArray
 
     operator = LinearOperator((right.size, right.size), matvec=system, dtype=np.complex128)
     found, failed = gmres(operator, right.ravel(), rtol=_RESIDUAL, atol=0.0, restart=150, maxiter=4)
-    return None if failed else found.reshape(right.shape)
+    return None if failed else np.asarray(found).reshape(right.shape)

@@ -234,8 +234,8 @@ def amplitude(scattered: Scattered, direction: ArrayLike) -> ComplexArray:
 
 def differential_width(scattered: Scattered, direction: ArrayLike) -> FloatArray:
     """Differential scattering width d sigma / d theta = 2 |f|^2 / (pi k): (q, t) float64, m/rad."""
-    found: FloatArray = 2.0 / (math.pi * scattered.wavenumber) * abs(amplitude(scattered, direction)) ** 2
-    return found
+    power = abs(amplitude(scattered, direction)) ** 2
+    return np.asarray(2.0 / (math.pi * scattered.wavenumber) * power, np.float64)
 
 
 def widths(scattered: Scattered) -> Widths:
@@ -274,7 +274,7 @@ def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
     k, cylinders = scattered.wavenumber, scattered.cylinders
     centres, radii = np.asarray(cylinders.centres), np.asarray(cylinders.radii)
     along = np.stack([np.cos(scattered.angle), np.sin(scattered.angle)])
-    found = np.exp(1j * k * (points @ along)).T
+    found: ComplexArray = np.exp(1j * k * (points @ along)).T
     inside = np.full(len(points), -1)
     for j, (centre, radius) in enumerate(zip(centres, radii, strict=True)):
         offset = points - centre

@@ -17,6 +17,7 @@ Index = complex | Callable[[Any], Any]
 CONDUCTOR: complex = complex(math.inf)  # the index of a perfect conductor
 _STEP = 0.05  # of the midpoint rule; poles nearer to the path than a few of these enter by residues
 _NEAR = 4  # poles on either side that may be that near
+_TOUCHING = 5e-15  # of k: no diffraction order grazes closer than that
 _OVERFLOW = 600.0  # exponent beyond which the integrand is nothing
 
 
@@ -26,7 +27,7 @@ def truncation(size_parameter: float) -> int:
     W. J. Wiscombe's rule (Appl. Opt. 19, 1505 (1980)), with its constants raised until the first order left
     out is 1e-13 of the largest, for k a = 0.01 to 1000. Cylinders that almost touch may need more.
     """
-    return math.ceil(size_parameter + 6.0 * size_parameter ** (1 / 3) + 2.0)
+    return math.ceil(size_parameter + 6.0 * math.cbrt(size_parameter) + 2.0)
 
 
 def at_wavelength(index: Index, wavelength: FloatArray) -> ComplexArray:
@@ -44,7 +45,7 @@ def check_polarisation(polarisation: str) -> None:
 def boundary(
     radius: ArrayLike, index: ArrayLike, host: ArrayLike, wavelength: ArrayLike, polarisation: Polarisation,
     orders: int,
-) -> tuple[ComplexArray, FloatArray, ComplexArray]:  # fmt: skip
+) -> tuple[Array, FloatArray, Array]:  # fmt: skip
     """What the boundary of a cylinder does to each harmonic (Bohren and Huffman, 8.30 to 8.37).
 
     Parameters
@@ -94,7 +95,8 @@ def boundary(
     response = np.where(conducting, hard, response)
     within = np.where(conducting, 0.0, -2j / (math.pi * x) / below)
     fold = abs(np.arange(-orders, orders + 1))
-    return response[..., fold], abs(h)[..., fold], within[..., fold]
+    weight = np.asarray(abs(h)[..., fold], np.float64)
+    return response[..., fold], weight, within[..., fold]
 
 
 def _with_derivative(cylinder_function: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -169,20 +171,23 @@ def _half_sum(beta: FloatArray, k: FloatArray, pitch: float, orders: int) -> Com
     reach = math.sqrt((40.0 + 3.0 * orders) / kd.min()) + 1.0
     s = _STEP * (np.arange(math.ceil(reach / _STEP)) + 0.5)
     geometric = 1.0 / np.expm1(np.minimum(kd * s**2, _OVERFLOW) - 1j * phase)
-    found = 2.0 * _STEP * _on_path(s**2, geometric, orders)
+    found: Array = 2.0 * _STEP * _on_path(s**2, geometric, orders)
     turns = np.round(phase / (2.0 * math.pi)) + np.arange(-_NEAR, _NEAR + 1)
-    square = 1j * (phase - 2.0 * math.pi * turns) / kd
+    apart = (phase - 2.0 * math.pi * turns) / kd
+    square = 1j * np.where(abs(apart) < _TOUCHING, _TOUCHING, apart)
     pole = np.sqrt(square)
     pole = np.where(pole.imag < 0, -pole, pole)
     turn = np.exp(2j * math.pi * pole / _STEP)
     found -= 4j * math.pi * _on_path(square, turn / (1.0 + turn) / (2.0 * kd * pole), orders)
-    return found * (-1j) ** np.arange(orders + 1) / math.pi
+    found = found * (-1j) ** np.arange(orders + 1) / math.pi
+    return found
 
 
-def _on_path(square: Array, factor: ComplexArray, orders: int) -> ComplexArray:
+def _on_path(square: Array, factor: Array, orders: int) -> ComplexArray:
     """Sum over s, whose squares are given, of factor T_l(1 + i s^2) 2 / sqrt(2 i - s^2): (..., L + 1)."""
     weight = factor * 2.0 / np.sqrt(2j - square)
-    return np.einsum("...s,...ls->...l", weight, _chebyshev(1.0 + 1j * square, orders))
+    found: ComplexArray = np.einsum("...s,...ls->...l", weight, _chebyshev(1.0 + 1j * square, orders))
+    return found
 
 
 def _chebyshev(z: ComplexArray, orders: int) -> ComplexArray:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise, zip_longest
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -205,7 +205,8 @@ def diffract(
 
 
 def spectrum(
-    lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike = 0.0, polarisation: str = "unpolarised",
+    lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike = 0.0,
+    polarisation: Polarisation | Literal["unpolarised"] = "unpolarised",
     method: str = "rods",
 ) -> Powers:  # fmt: skip
     """Reflectance and transmittance of a lattice, all diffraction orders together.
@@ -232,8 +233,9 @@ def spectrum(
         If the method or the polarisation is unknown.
     """
     if polarisation == "unpolarised":
-        both = [spectrum(lattice, wavelength, angle, each, method) for each in ("E", "H")]
-        return Powers(*(sum(each) / 2.0 for each in zip(*both, strict=True)))
+        e = spectrum(lattice, wavelength, angle, "E", method)
+        h = spectrum(lattice, wavelength, angle, "H", method)
+        return Powers((e.reflectance + h.reflectance) / 2.0, (e.transmittance + h.transmittance) / 2.0)
     check_polarisation(polarisation)
     if method == "multilayer":
         return _blurred(lattice, wavelength, angle, polarisation)
@@ -269,8 +271,8 @@ def _media(lattice: Lattice, wavelength: FloatArray) -> tuple[ComplexArray, Comp
     """Index of front, host and back at each wavelength."""
     if not np.all(wavelength > 0):
         raise ValueError(f"Wavelength: expected positive lengths in metres, got {wavelength.min()}")
-    back = lattice.host if lattice.back is None else lattice.back
-    front, host, back = (at_wavelength(index, wavelength) for index in (lattice.front, lattice.host, back))
+    behind = lattice.host if lattice.back is None else lattice.back
+    front, host, back = (at_wavelength(index, wavelength) for index in (lattice.front, lattice.host, behind))
     for name, index in (("Front", front), ("Host", host)):
         if not (np.all(index.real > 0) and np.all(index.imag == 0)):
             raise ValueError(f"{name}: expected a positive real refractive index, got {index}")

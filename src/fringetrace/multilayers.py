@@ -22,7 +22,7 @@ class Powers(NamedTuple):
     transmittance: FloatArray
 
 
-def effective_index(fraction: ArrayLike, index: ArrayLike, polarisation: Polarisation) -> ComplexArray:
+def effective_index(fraction: FloatArray, index: ComplexArray, polarisation: Polarisation) -> ComplexArray:
     """Effective index of thin layers that hold cylinders: n_eff^w = sum of f n^w, w = 2.5 ("E"), -1.5 ("H").
 
     A mean between those over n^2 and n^-2, as used for the feathers of peacocks; for the lattices tested,
@@ -42,7 +42,7 @@ def effective_index(fraction: ArrayLike, index: ArrayLike, polarisation: Polaris
     """
     check_polarisation(polarisation)
     power = EXPONENT[polarisation]
-    found: ComplexArray = (fraction * np.asarray(index, np.complex128) ** power).sum(-1) ** (1.0 / power)
+    found: ComplexArray = (fraction * index**power).sum(-1) ** (1.0 / power)
     return found
 
 
@@ -74,19 +74,20 @@ def stack(
     check_polarisation(polarisation)
     front, back, index = (np.asarray(v, np.complex128) for v in (front, back, index))
     along = front * np.sin(angle)
-
-    def across(n: ComplexArray, along: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-        cosine = np.sqrt(n**2 - along**2)
-        return cosine, cosine if polarisation == "E" else cosine / n**2
-
-    cosine, admittance = across(index, along[..., None])
+    cosine = np.sqrt(index**2 - along[..., None] ** 2)
     turn = 2.0 * math.pi * cosine * np.asarray(thickness) / np.asarray(wavelength)[..., None]
-    first, last = across(front, along)[1], across(back, along)[1]
+    first, last = (np.sqrt(n**2 - along**2) for n in (front, back))
+    admittance = cosine
+    if polarisation == "H":
+        first, last, admittance = first / front**2, last / back**2, cosine / index**2
+    cos, sin = np.cos(turn), -1j * np.sin(turn)
     field, slope = np.ones_like(last), last
-    for c, s, q in zip(
-        *(np.moveaxis(v, -1, 0)[::-1] for v in (np.cos(turn), -1j * np.sin(turn), admittance)), strict=True
-    ):
-        field, slope = c * field + s / q * slope, q * s * field + c * slope
+    for j in reversed(range(turn.shape[-1])):
+        c, s, q = cos[..., j], sin[..., j], admittance[..., j]
+        field, slope = c * field + s / q * slope, s * q * field + c * slope
     total = first * field + slope
     reflected, transmitted = (first * field - slope) / total, 2.0 * first / total
-    return Powers(abs(reflected) ** 2, last.real / first.real * abs(transmitted) ** 2)
+    return Powers(
+        np.asarray(abs(reflected) ** 2, np.float64),
+        np.asarray(last.real / first.real * abs(transmitted) ** 2, np.float64),
+    )

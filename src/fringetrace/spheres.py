@@ -75,9 +75,8 @@ def efficiencies(radius: float, index: complex, host: float, wavelength: float) 
     back = abs((weight * (-1.0) ** n * (a - b)).sum()) ** 2 / x**2
     neighbours = (a[:-1] * a[1:].conj() + b[:-1] * b[1:].conj()).real
     moment = (n * (n + 2) / (n + 1))[:-1] @ neighbours + (weight / (n * (n + 1))) @ (a * b.conj()).real
-    return Efficiencies(
-        extinction, scattering, extinction - scattering, back, 4.0 * moment / x**2 / scattering
-    )
+    asymmetry = 4.0 * moment / x**2 / scattering
+    return Efficiencies(*map(float, (extinction, scattering, extinction - scattering, back, asymmetry)))
 
 
 def amplitudes(
