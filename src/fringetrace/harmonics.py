@@ -17,6 +17,7 @@ Index = complex | Callable[[Any], Any]
 CONDUCTOR: complex = complex(math.inf)  # the index of a perfect conductor
 _STEP = 0.05  # of the midpoint rule; poles nearer to the path than a few of these enter by residues
 _NEAR = 4  # poles on either side that may be that near
+_FAR = 1.0  # of k, detuning from which an order's pole counts exp(-88)
 _TOUCHING = 5e-15  # of k: no diffraction order grazes closer than that
 _OVERFLOW = 600.0  # exponent beyond which the integrand is nothing
 
@@ -174,11 +175,12 @@ def _half_sum(beta: FloatArray, k: FloatArray, pitch: float, orders: int) -> Com
     found: Array = 2.0 * _STEP * _on_path(s**2, geometric, orders)
     turns = np.round(phase / (2.0 * math.pi)) + np.arange(-_NEAR, _NEAR + 1)
     apart = (phase - 2.0 * math.pi * turns) / kd
-    square = 1j * np.where(abs(apart) < _TOUCHING, _TOUCHING, apart)
+    near = abs(apart) < _FAR
+    square = 1j * np.where(near, np.where(abs(apart) < _TOUCHING, _TOUCHING, apart), _FAR)
     pole = np.sqrt(square)
     pole = np.where(pole.imag < 0, -pole, pole)
-    turn = np.exp(2j * math.pi * pole / _STEP)
-    found -= 4j * math.pi * _on_path(square, turn / (1.0 + turn) / (2.0 * kd * pole), orders)
+    turn = near * np.exp(2j * math.pi * pole / _STEP)
+    found += 4j * math.pi * _on_path(square, turn / (1.0 + turn) / (2.0 * kd * pole), orders)
     found = found * (-1j) ** np.arange(orders + 1) / math.pi
     return found
 

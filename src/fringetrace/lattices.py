@@ -31,6 +31,7 @@ from fringetrace.multilayers import Powers, effective_index, stack
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 _SLICES = 64  # flat layers a pitch, of method "multilayer"
+_EVANESCENT = 7  # diffraction orders beyond those that propagate: reciprocity then holds to 1e-11
 _GRAZING = 1e-7  # of k: wavenumbers across the rows are kept this far from zero, where sums diverge
 
 
@@ -162,7 +163,7 @@ def diffract(
     polarisation : ``"E"`` or ``"H"``
         The field along the cylinders.
     orders : int, optional
-        Highest diffraction order G; by default those that propagate and 4 more, on either side.
+        Highest diffraction order G; by default those that propagate and 7 more, on either side.
     harmonics : int, optional
         Highest cylindrical harmonic; by default that of `truncation`.
 
@@ -180,7 +181,7 @@ def diffract(
     front, host, back = _media(lattice, wavelength)
     vacuum = 2.0 * math.pi / wavelength
     if orders is None:
-        orders = 4 + math.ceil(2.0 * np.max(host.real * lattice.pitch / wavelength))
+        orders = _EVANESCENT + math.ceil(2.0 * np.max(host.real * lattice.pitch / wavelength))
     order = np.arange(-orders, orders + 1)
     beta = (vacuum * front.real * np.sin(angle))[..., None] + order * 2.0 * math.pi / lattice.pitch
     light = _Light(beta, vacuum, polarisation)
