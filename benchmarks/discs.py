@@ -81,7 +81,40 @@ def rays(centres, radius, incidence, direction, bounces):
     return [each for each in found if each is not None]
 
 
-def amplitude(found, k):
-    """Scattering amplitude f of perfectly conducting discs, E along them: a sign for each bounce."""
-    parts = [(-1) ** len(r.discs) / math.sqrt(r.spread) * np.exp(1j * k * r.path) for r in found]
+def amplitude(found, k, sign=-1):
+    """Scattering amplitude f of perfectly conducting discs; each bounce turns the sign if E is along them."""
+    parts = [sign ** len(each.discs) / math.sqrt(each.spread) * np.exp(1j * k * each.path) for each in found]
     return math.sqrt(math.pi * k / 2) * np.exp(0.25j * math.pi) * sum(parts)
+
+
+def through(index, k, polarisation, turn, passes=4):
+    """Scattering amplitude f of one clear rod of radius 1: rays reflected, and let out after each pass.
+
+    A ray with angle of incidence i, inside r, turns by (1 - p) pi - 2 i + 2 p r after p passes and goes
+    through p foci, one less where its turn falls with i (H. C. van de Hulst, Light Scattering by Small
+    Particles, 12.2).
+    """
+    start = np.linspace(-math.pi / 2, math.pi / 2, 8001)[1:-1]
+    total = np.zeros(len(turn), complex)
+    for p in range(passes + 1):
+        off = _wrapped(
+            (1 - p) * math.pi - 2 * start + 2 * p * np.arcsin(np.sin(start) / index) - turn[:, None]
+        )
+        way, j = np.nonzero((off[:, :-1] * off[:, 1:] <= 0) & (abs(np.diff(off)) < 1))
+        i = start[j] + (start[1] - start[0]) * off[way, j] / (off[way, j] - off[way, j + 1])
+        for _ in range(3):  # Newton, but not away from where two solutions meet
+            miss = _wrapped((1 - p) * math.pi - 2 * i + 2 * p * np.arcsin(np.sin(i) / index) - turn[way])
+            step = miss / (2 * p * np.cos(i) / np.sqrt(index**2 - np.sin(i) ** 2) - 2)
+            i = np.clip(i - np.where(abs(step) < 0.01, step, 0.0), start[0], start[-1])
+        cosine, inner = np.cos(i), np.sqrt(1 - (np.sin(i) / index) ** 2)
+        growth = 2 - 2 * p * cosine / (index * inner)
+        one, other = (cosine, index * inner) if polarisation == "E" else (index * cosine, inner)
+        reflected = (one - other) / (one + other)
+        strength = reflected if p == 0 else (1 - reflected**2) * (-reflected) ** (p - 1)
+        phase = k * (2 * p * index * inner - 2 * cosine) - math.pi / 2 * (p - (growth < 0))
+        np.add.at(total, way, strength * np.sqrt(cosine / abs(growth)) * np.exp(1j * phase))
+    return math.sqrt(math.pi * k / 2) * np.exp(0.25j * math.pi) * total
+
+
+def _wrapped(angle):
+    return (angle + math.pi) % (2 * math.pi) - math.pi

@@ -19,8 +19,8 @@ def test_a_melanin_rod_is_no_case_for_rays():
 def test_laws():
     mirror = validity(10 * um, 500 * nm, CONDUCTOR)
     assert mirror.phase == math.inf
-    assert mirror.ray_error == pytest.approx(2 / (2 * math.pi * 20))
-    assert mirror.label == "rays hold to about 1.6 %"
+    assert mirror.ray_error == pytest.approx(2.4 / (2 * math.pi * 20))
+    assert mirror.label == "rays hold to about 1.9 %"
     glass = validity(10 * um, 500 * nm, 1.5)
     assert glass.ray_error == pytest.approx(3 / math.sqrt(2 * math.pi * 20))
     assert glass.label == "rays are a rough model, about 27 % off"

@@ -10,7 +10,7 @@ import numpy as np
 from fringetrace.harmonics import Index, at_wavelength
 
 # Laws of rays against the rigorous answer, k a = 8 to 250, fitted in docs/rigorous.md
-_OPAQUE = 2.0  # over k a: light that two conducting discs reflect
+_OPAQUE = 2.4  # over k a: light that two conducting discs reflect
 _CLEAR = 3.0  # over sqrt(k a): light through and off one clear rod, at more than 3 degrees from straight on
 _DARK = 0.01  # of the light passes straight through a rod that counts as opaque
 _ROUGH, _NONE = 0.1, 0.5  # errors from which rays are a rough model, and none
@@ -45,7 +45,7 @@ def validity(radius: float, wavelength: float, index: Index, host: Index = 1.0) 
     """How far rays can be believed on a round part of a scene.
 
     The error is that of the coherent sum of rays in the far field, by laws measured against the rigorous
-    answer (docs/rigorous.md): 2 / (k a) for light reflected off opaque rods, 3 / sqrt(k a) for clear ones,
+    answer (docs/rigorous.md): 2.4 / (k a) for light reflected off opaque rods, 3 / sqrt(k a) for clear ones,
     whose shadow edges, rainbows and surface waves rays leave out.
 
     Parameters

@@ -90,9 +90,9 @@ def test_conducting_rods_in_air_reflect_without_a_band():
     rods = Cylinders(centres, 65 * nm, CONDUCTOR)
     found = [
         differential_width(scatter(rods, wavelength * nm, IN, "E", orders=5), math.pi / 2)[0, 0] / nm
-        for wavelength in (425, 475, 525, 575, 625)
+        for wavelength in (400, 475, 550)
     ]
-    assert 50e3 < min(found) < max(found) < 80e3
+    assert 54.5e3 < min(found) < max(found) < 73.5e3
 
 
 def test_rays_between_two_discs():
@@ -134,7 +134,7 @@ def test_rays_against_the_exact_wave(direction, percent):
             assert abs(exact - (-3.487641 + 9.148322j)) < 1e-6
         error = abs(discs.amplitude(found, 2 * math.pi / wavelength) / exact - 1)
         assert 100 * error == pytest.approx(expected, abs=0.051)
-        assert error < 1.5 * validity(5, wavelength, CONDUCTOR).ray_error
+        assert error < validity(5, wavelength, CONDUCTOR).ray_error
 
 
 @pytest.mark.parametrize("size", [100.0, 1000.0])
