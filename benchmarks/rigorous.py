@@ -63,6 +63,10 @@ def clear(sizes, index, polarisation, low, high):
     return errors
 
 
+def _percent(value):
+    return f"{100 * value:.2g}" if value < 0.1 else f"{100 * value:.0f}"
+
+
 def rays_table():
     """Errors of rays in per cent as rods grow, and the laws of `validity`."""
     columns = [opaque(SIZES, "E"), opaque(SIZES, "H")]
@@ -78,7 +82,7 @@ def rays_table():
     )
     order = [columns[0], columns[1], laws[0], *columns[2:], laws[1]]
     rows = [
-        f"| {size} | " + " | ".join(f"{100 * column[j]:.2g}" for column in order) + " |"
+        f"| {size} | " + " | ".join(_percent(column[j]) for column in order) + " |"
         for j, size in enumerate(SIZES)
     ]
     return columns, laws, "\n".join([head, *rows])

@@ -99,5 +99,6 @@ def test_lattice_sums_agree_with_treams(beta, pitch):
     k = 2 * np.pi
     found = lattice_sums(beta, k, pitch, 6)
     for order in range(-6, 7):
+        # its Ewald sums stop at some 1e-9
         expected = treams.lattice.lsumcw1d(order, k, beta, pitch, 0.0, 0)
-        assert found[6 + order] == pytest.approx(expected, rel=1e-9, abs=1e-9 * abs(found).max())
+        assert found[6 + order] == pytest.approx(expected, rel=1e-8, abs=1e-8 * abs(found).max())
