@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fringetrace.bounds import Bounds, bounds
 from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
-from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.interfaces import Absorber, BeamSplitter, Dielectric, Metal, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -24,12 +24,19 @@ from fringetrace.waves import degree, mm, nm, um
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import (
+        crystals,
         cylinders,
+        elements,
+        films,
         forms,
+        gratings,
         instruments,
         lattices,
+        materials,
         meshes,
         phase,
+        plates,
+        polarisers,
         shapes,
         spheres,
         vectors,
@@ -44,11 +51,13 @@ __all__ = [
     "BeamSplitter",
     "Bounds",
     "Budget",
+    "Dielectric",
     "Fate",
     "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
+    "Metal",
     "Mirror",
     "Paths",
     "Rays",
@@ -58,17 +67,24 @@ __all__ = [
     "bounds",
     "budget",
     "complex_field",
+    "crystals",
     "cylinders",
     "degree",
+    "elements",
+    "films",
     "forms",
+    "gratings",
     "instruments",
     "irradiance",
     "lattices",
+    "materials",
     "meshes",
     "mm",
     "mutual_intensity",
     "nm",
     "phase",
+    "plates",
+    "polarisers",
     "shapes",
     "spheres",
     "stream",
@@ -81,17 +97,9 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "cylinders",
-    "forms",
-    "instruments",
-    "lattices",
-    "meshes",
-    "phase",
-    "shapes",
-    "spheres",
-    "vectors",
-    "views",
-)
+    "crystals", "cylinders", "elements", "films", "forms", "gratings", "instruments", "lattices", "materials",
+    "meshes", "phase", "plates", "polarisers", "shapes", "spheres", "vectors", "views",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
