@@ -7,6 +7,7 @@ from rods import feather, keratin, melanin
 from fringetrace import nm
 from fringetrace.cylinders import CONDUCTOR
 from fringetrace.lattices import Lattice, Row, diffract, spectrum
+from fringetrace.materials import KERATIN, MELANIN
 
 BALANCE = 1e-10  # power, and reciprocity: rounding of a stack
 ROW = Row(80 * nm, 50 * nm, 1.75)
@@ -103,6 +104,9 @@ def test_indices_may_depend_on_wavelength():
     wavelength = 480 * nm
     fixed = feather(160, 170, 100, 110, 0, 2, melanin(wavelength), keratin(wavelength))
     assert spectrum(feather(160, 170, 100, 110, 0, 2), wavelength) == spectrum(fixed, wavelength)
+    named = feather(160, 170, 100, 110, 0, 2, MELANIN.index, KERATIN.index)
+    found = spectrum(named, np.array([wavelength])).reflectance
+    np.testing.assert_allclose(found, spectrum(fixed, wavelength).reflectance, rtol=BALANCE)
 
 
 @pytest.mark.parametrize(
