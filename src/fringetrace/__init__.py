@@ -22,7 +22,7 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import bsdf, forms, instruments, meshes, phase, shapes, spectra, swatches, vectors, views
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "Scene",
     "Surface",
     "bounds",
+    "bsdf",
     "budget",
     "complex_field",
     "degree",
@@ -55,7 +56,9 @@ __all__ = [
     "nm",
     "phase",
     "shapes",
+    "spectra",
     "stream",
+    "swatches",
     "trace",
     "um",
     "vectors",
@@ -63,7 +66,9 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = (
+    "bsdf", "forms", "instruments", "meshes", "phase", "shapes", "spectra", "swatches", "vectors", "views",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
