@@ -22,6 +22,8 @@ AXES = ("theta_i", "phi_i", "theta_o", "phi_o", "wavelength")
 TYPES = {"uint8": 1, "float32": 10}
 # Where nothing is reflected a direction is still drawn this often, as a part of the mean.
 SELDOM = 1e-3
+# Light along the surface is looked up this part above it, for there is none on it.
+GRAZING = 1e-6
 
 
 def table(
@@ -169,6 +171,10 @@ def sphere(brdf: DataArray, light: npt.ArrayLike = (0.0, 0.0, 1.0), pixels: int 
     return image
 
 
+def _direction(theta: float, phi: float) -> FloatArray:
+    return np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+
+
 def _halfway(pixels: int) -> tuple[FloatArray, FloatArray]:
     """Half vectors on Mitsuba's square, (phi, theta, 3), and the solid angle that each stands for."""
     u = np.linspace(0.0, 1.0, pixels)
@@ -178,55 +184,61 @@ def _halfway(pixels: int) -> tuple[FloatArray, FloatArray]:
 
 
 def mitsuba(
-    brdf: DataArray, path: str | os.PathLike[str], pixels: int = 64, name: str = "fringetrace"
+    brdf: DataArray,
+    path: str | os.PathLike[str],
+    pixels: int = 64,
+    incidences: tuple[int, int] = (19, 37),
+    name: str = "fringetrace",
 ) -> None:
     """A file for the BSDF `measured` of Mitsuba 3, in its spectral variants.
 
     That stores f cos(theta_o) against the half vector between light and eye, on a square of
     sqrt(theta_m) and phi_m (Dupuy and Jakob, ACM Trans. Graph. 37, 274 (2018)), with maps that say
     where to draw directions. Its warp is left out here (a uniform one, `jacobian` 0), so that no normal
-    distribution has to be made up; directions are drawn as light is reflected.
+    distribution has to be made up; directions are drawn as light is reflected. The file takes
+    4 bytes x pixels^2 x incidences x wavelengths.
 
     Parameters
     ----------
     brdf : xarray.DataArray
-        As of `table`. phi_i: one angle (isotropic), or from -pi to pi.
+        As of `table`, resampled by `lookup`; a single phi_i is an isotropic surface.
     path : path
-        Ends in .bsdf, for Mitsuba. The file is there in full or not at all.
+        The file is there in full or not at all.
     pixels : int, at least 2
         Of the half vector in either angle. Mitsuba's interpolation is linear between them.
+    incidences : (theta, phi)
+        Angles of the light, over 0 to pi/2 and -pi to pi; phi is 1 for isotropic surfaces. Linear between
+        them too, at one half vector: it is these that a smooth surface needs.
     name : str
         A description, kept in the file.
 
     Raises
     ------
     ValueError
-        If axes or values are not those of a BRDF, or phi_i is part of a turn.
+        If axes or values are not those of a BRDF.
     """
-    (theta_i, phi_i, _, _), _ = _checked(brdf)
-    ends = -np.pi, np.pi
-    if len(phi_i) > 1 and (len(phi_i) < 3 or not np.allclose(phi_i[[0, -1]], ends, atol=1e-6)):
-        raise ValueError(f"BRDF: expected one phi_i, or at least three from -pi to pi, got {phi_i}")
+    _checked(brdf)
+    theta_i = np.linspace(0.0, 0.5 * np.pi, incidences[0])
+    phi_i = np.linspace(-np.pi, np.pi, incidences[1]) if brdf.sizes["phi_i"] > 1 else np.zeros(1)
     half, share = _halfway(pixels)
     shape = (len(phi_i), len(theta_i), pixels, pixels)
     spectra = np.empty((*shape[:2], brdf.shape[-1], pixels, pixels), dtype=np.float32)
     chance = np.empty(shape, dtype=np.float32)
-    for j, phi in enumerate(phi_i if len(phi_i) > 1 else [0.0]):
-        for i, theta in enumerate(theta_i):
-            wi = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
-            cosine = half @ wi
-            wo = 2.0 * cosine[..., None] * half - wi
-            light = lookup(brdf, np.broadcast_to(wi, wo.shape), wo) * np.maximum(wo[..., 2:], 0.0)
-            spectra[j, i] = np.moveaxis(light, -1, 0)
-            drawn = light.mean(axis=-1) * np.maximum(cosine, 0.0) * share
-            chance[j, i] = drawn + SELDOM * drawn.mean() + np.finfo(np.float32).tiny
+    for j, i in np.ndindex(*shape[:2]):
+        wi = _direction(min(theta_i[i], 0.5 * np.pi * (1.0 - GRAZING)), phi_i[j])
+        cosine = half @ wi
+        wo = 2.0 * cosine[..., None] * half - wi
+        light = lookup(brdf, wi, wo) * np.maximum(wo[..., 2:], 0.0)
+        spectra[j, i] = np.moveaxis(light, -1, 0)
+        drawn = light.mean(axis=-1) * np.maximum(cosine, 0.0) * share
+        chance[j, i] = drawn + SELDOM * drawn.mean() + np.finfo(np.float32).tiny
     even = np.ones((2, 2), dtype=np.float32)
     _write_tensors(
         path,
         description=np.frombuffer(name.encode(), dtype=np.uint8),
         jacobian=np.zeros(1, dtype=np.uint8),
         theta_i=theta_i.astype(np.float32),
-        phi_i=phi_i.astype(np.float32) if len(phi_i) > 1 else np.zeros(1, dtype=np.float32),
+        phi_i=phi_i.astype(np.float32),
         wavelengths=(np.asarray(brdf["wavelength"]) / nm).astype(np.float32),
         ndf=even, sigma=even, vndf=np.ones((*shape[:2], 2, 2), dtype=np.float32),
         luminance=chance, spectra=spectra,

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from fringetrace.guards import FringetraceWarning
 from fringetrace.tables import read_csv as load
 from fringetrace.tables import write_csv as save
-from fringetrace.waves import FloatArray, nm, um
+from fringetrace.waves import Array, FloatArray, nm, um
 
 __all__ = [
     "chromaticity", "illuminant", "lab", "load", "luminance", "observer", "samples", "save", "srgb",
@@ -34,8 +34,9 @@ DAYLIGHT = {"D50": 5000.0, "D55": 5500.0, "D65": 6500.0, "D75": 7500.0}
 RADIATION, RADIATION_THEN = 1.4388e-2, 1.4380e-2
 # Lumens a watt at 540 THz, which defines the candela.
 EFFICACY = 683.0
-# Leaving out every second sample may move X, Y or Z by this part of white: about one unit of Lab.
-COARSE = 0.01
+# Every second sample may stand off the cubic through the others by this part of white, in the mean:
+# fringes of full contrast with some nine samples each.
+COARSE = 0.03
 # Samples a fringe, at 400 nm.
 PER_FRINGE = 6
 GAMUTS = ("clip", "desaturate", "linear")
@@ -98,8 +99,8 @@ def illuminant(light: Light, wavelengths: npt.ArrayLike) -> FloatArray:
     Parameters
     ----------
     light : str or (wavelengths, power)
-        "D65", "D50", "A", "E" (equal energy), "FL2", "LED-B3" and others of colour-science's tables; a
-        temperature such as "5000 K" for a black body; or a table of one's own (metres, any unit), 0 outside.
+        "D65", "A", "E" (equal energy), "FL2", "LED-B3" and others of colour-science's tables; "5000 K", a
+        black body; or a table of one's own (metres, any unit), 0 outside.
     wavelengths : (n,) array-like, metres
 
     Returns
@@ -124,7 +125,8 @@ def illuminant(light: Light, wavelengths: npt.ArrayLike) -> FloatArray:
     kelvin = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*K\s*", light)
     if kelvin and float(kelvin[1]) > 0.0:
         planck, temperature = _colour().colorimetry.planck_law, float(kelvin[1])
-        return np.asarray(100.0 * planck(at, temperature) / planck(560.0 * nm, temperature))
+        power = planck(at, temperature) / planck(560.0 * nm, temperature)
+        return np.reshape(100.0 * power, at.shape)
     return np.interp(at / nm, *_tabulated(light))
 
 
@@ -133,8 +135,7 @@ def observer(degrees: int, wavelengths: npt.ArrayLike) -> FloatArray:
 
     Parameters
     ----------
-    degrees : {2, 10}
-        Field of view: CIE 1931, CIE 1964.
+    degrees : {2 (CIE 1931), 10 (CIE 1964)}
     wavelengths : (n,) array-like, metres
 
     Returns
@@ -150,17 +151,24 @@ def observer(degrees: int, wavelengths: npt.ArrayLike) -> FloatArray:
     return np.stack(columns, axis=-1)
 
 
-def _spread(points: FloatArray, values: FloatArray, samples: FloatArray) -> FloatArray:
-    """Weights of samples, from those of points between them: Lagrange's cubic, (samples, columns)."""
+def _lagrange(points: FloatArray, samples: FloatArray) -> tuple[Array, list[FloatArray]]:
+    """The first of four samples about each point, and the parts of all four in the cubic through them."""
     x = np.clip(points, samples[0], samples[-1])
     first = np.clip(np.searchsorted(samples, x, side="right") - 2, 0, len(samples) - 4)
-    near = first[:, None] + np.arange(4)
-    nodes = samples[near]
+    nodes = [samples[first + one] for one in range(4)]
+    parts = [
+        np.prod([(x - far) / (near - far) for far in (*nodes[:one], *nodes[one + 1 :])], axis=0)
+        for one, near in enumerate(nodes)
+    ]
+    return first, parts
+
+
+def _spread(points: FloatArray, values: FloatArray, samples: FloatArray) -> FloatArray:
+    """Weights of samples, (samples, columns), from those of points between them."""
+    first, parts = _lagrange(points, samples)
     weights = np.zeros((len(samples), values.shape[1]))
-    for one in range(4):
-        others = [other for other in range(4) if other != one]
-        parts = [(x - nodes[:, other]) / (nodes[:, one] - nodes[:, other]) for other in others]
-        np.add.at(weights, near[:, one], np.prod(parts, axis=0)[:, None] * values)
+    for one, part in enumerate(parts):
+        np.add.at(weights, first + one, part[:, None] * values)
     return weights
 
 
@@ -227,18 +235,20 @@ def samples(path: float = 0.0) -> FloatArray:
     return np.linspace(FIRST, LAST, count + 1) * nm
 
 
-def _warn(values: FloatArray, full: FloatArray, found: FloatArray, light: Light, degrees: int) -> None:
-    """Warn of spectra whose colour depends on every second sample: their fringes may alias."""
-    if len(found) < 8 or found[-2] < NEEDED[1]:
+def _warn(values: FloatArray, samples: FloatArray, weights: FloatArray) -> None:
+    """Warn of spectra in which samples are not what their neighbours let expect: fringes may alias."""
+    if len(samples) < 8:
         return
-    half = weights(found[::2] * nm, light, degrees)
-    off = np.abs(values[..., ::2] @ half - full).max(axis=-1)
-    many = int((off > COARSE).sum())
-    if many:
-        step = float(np.median(np.diff(found)))
+    first, parts = _lagrange(samples[1::2], samples[::2])
+    half = values[..., ::2]
+    off = abs(values[..., 1::2] - sum(part * half[..., first + one] for one, part in enumerate(parts)))
+    share = np.abs(weights[1::2, 1])
+    mean = np.asarray(off @ (share / share.sum()))
+    if many := int((mean > COARSE).sum()):
         warnings.warn(
-            f"colours: {many} of {off.size} spectra are sampled too coarsely ({step:.3g} nm): without every "
-            f"second sample X, Y or Z move by up to {off.max():.2g} of white, and fringes may alias; "
+            f"colours: {many} of {mean.size} spectra are sampled too coarsely "
+            f"({np.median(np.diff(samples)):.3g} nm): from sample to sample they are off the cubic through "
+            f"their neighbours by {mean.max():.2g} of white in the mean, and fringes may alias; "
             "take the wavelengths of spectra.samples(path)",
             FringetraceWarning,
             stacklevel=3,
@@ -259,8 +269,7 @@ def xyz(
         Increasing, at least from 400 nm to 700 nm.
     illuminant : str or (wavelengths, power)
         See `illuminant`.
-    observer : {2, 10}
-        Degrees of the field of view.
+    observer : {2, 10}, degrees
 
     Returns
     -------
@@ -274,8 +283,8 @@ def xyz(
     Warns
     -----
     FringetraceWarning
-        If half the samples give other colours: steps of wavelength have to be well below lambda^2 / D, D
-        being the optical path difference, else fringes alias.
+        If samples do not follow from their neighbours: steps of wavelength have to be well below
+        lambda^2 / D, D being the optical path difference, else fringes alias.
     """
     values = np.asarray(reflectance, dtype=np.float64)
     found = _checked(wavelengths)
@@ -285,9 +294,9 @@ def xyz(
         raise ValueError(
             f"reflectance: expected finite numbers, got {int((~np.isfinite(values)).sum())} others"
         )
-    full = np.asarray(values @ weights(wavelengths, illuminant, observer))
-    _warn(values, full, found, illuminant, observer)
-    return full
+    sums = weights(wavelengths, illuminant, observer)
+    _warn(values, found, sums)
+    return np.asarray(values @ sums)
 
 
 def white(illuminant: Light = "D65", observer: int = 2) -> FloatArray:
@@ -323,8 +332,7 @@ def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
 
     Returns
     -------
-    (..., 2) float64
-        X and Y over X + Y + Z; NaN for black.
+    (..., 2) float64, NaN for black
     """
     values = np.asarray(xyz, dtype=np.float64)
     total = values.sum(axis=-1, keepdims=True)
@@ -337,10 +345,8 @@ def lab(xyz: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2) -> Flo
 
     Parameters
     ----------
-    xyz : (..., 3) array-like
-        White has Y = 1.
-    illuminant, observer
-        Those of the white.
+    xyz : (..., 3) array-like, white has Y = 1
+    illuminant, observer : those of the white
 
     Returns
     -------
@@ -356,8 +362,7 @@ def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Light = "D65") -> 
 
     Parameters
     ----------
-    xyz : (..., 3) array-like
-        White has Y = 1.
+    xyz : (..., 3) array-like, white has Y = 1
     gamut : {"clip", "desaturate", "linear"}
         What becomes of colours that no screen shows. "clip": each of linear R, G, B is cut to [0, 1].
         "desaturate": mixed with the grey of the same Y (1, if above it) until all lie in [0, 1].

@@ -129,9 +129,8 @@ def _numbers(path: str | os.PathLike[str]) -> tuple[list[str], FloatArray]:
     numbers = frame.apply(pandas.to_numeric, errors="coerce").to_numpy(dtype=np.float64)
     if not np.isfinite(numbers).all():
         row, column = np.argwhere(~np.isfinite(numbers))[0]
-        raise ValueError(
-            f"{path}: expected numbers, got {frame.iat[row, column]!r} in row {row + 1} of {heads[column]!r}"
-        )
+        found = str(frame.iat[row, column])
+        raise ValueError(f"{path}: expected numbers, got {found!r} in row {row + 1} of {heads[column]!r}")
     numbers = numbers[np.argsort(numbers[:, 0], kind="stable")]
     if (twice := np.flatnonzero(np.diff(numbers[:, 0]) == 0.0)).size:
         raise ValueError(f"{path}: expected each wavelength once, got {numbers[twice[0], 0]:g} twice")
