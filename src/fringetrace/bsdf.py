@@ -225,7 +225,8 @@ def mitsuba(
     spectra = np.empty((*shape[:2], brdf.shape[-1], pixels, pixels), dtype=np.float32)
     chance = np.empty(shape, dtype=np.float32)
     for j, i in np.ndindex(*shape[:2]):
-        wi = _direction(min(theta_i[i], 0.5 * np.pi * (1.0 - GRAZING)), phi_i[j])
+        theta = np.minimum(theta_i[i], 0.5 * np.pi * (1.0 - GRAZING))
+        wi = _direction(float(theta), float(phi_i[j]))
         cosine = half @ wi
         wo = 2.0 * cosine[..., None] * half - wi
         light = lookup(brdf, wi, wo) * np.maximum(wo[..., 2:], 0.0)

@@ -249,9 +249,7 @@ def spectrum(
         overlaid = measured.transpose("sample", "wavelength")
         for row, name in enumerate(overlaid["sample"].values):
             line = ("--", ":", "-.")[row % 3]
-            ax.plot(
-                overlaid["wavelength"] / nm, overlaid[row], line, color="black", label=f"{name}, measured"
-            )
+            ax.plot(overlaid["wavelength"] / nm, overlaid[row], line, color="black", label=str(name))
     ax.set(xlabel="wavelength / nm", ylabel="reflectance", xlim=(at[0] / nm, at[-1] / nm))
     top = ax.get_ylim()[1]
     ax.set_ylim(-0.06 * top, top)
