@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fringetrace.bounds import Bounds, bounds
 from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
-from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.interfaces import Absorber, BeamSplitter, Dielectric, Metal, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -22,7 +22,25 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import bsdf, forms, instruments, meshes, phase, shapes, spectra, swatches, vectors, views
+    from fringetrace import (
+        bsdf,
+        crystals,
+        elements,
+        films,
+        forms,
+        gratings,
+        instruments,
+        materials,
+        meshes,
+        phase,
+        plates,
+        polarisers,
+        shapes,
+        spectra,
+        swatches,
+        vectors,
+        views,
+    )
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -32,11 +50,13 @@ __all__ = [
     "BeamSplitter",
     "Bounds",
     "Budget",
+    "Dielectric",
     "Fate",
     "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
+    "Metal",
     "Mirror",
     "Paths",
     "Rays",
@@ -46,15 +66,22 @@ __all__ = [
     "bsdf",
     "budget",
     "complex_field",
+    "crystals",
     "degree",
+    "elements",
+    "films",
     "forms",
+    "gratings",
     "instruments",
     "irradiance",
+    "materials",
     "meshes",
     "mm",
     "mutual_intensity",
     "nm",
     "phase",
+    "plates",
+    "polarisers",
     "shapes",
     "spectra",
     "stream",
@@ -67,7 +94,8 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "bsdf", "forms", "instruments", "meshes", "phase", "shapes", "spectra", "swatches", "vectors", "views",
+    "bsdf", "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes", "phase",
+    "plates", "polarisers", "shapes", "spectra", "swatches", "vectors", "views",
 )  # fmt: skip
 
 
