@@ -94,8 +94,8 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "bsdf", "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes", "phase",
-    "plates", "polarisers", "shapes", "spectra", "swatches", "vectors", "views",
+    "bsdf", "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes",
+    "phase", "plates", "polarisers", "shapes", "spectra", "swatches", "vectors", "views",
 )  # fmt: skip
 
 
