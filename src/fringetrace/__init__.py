@@ -23,6 +23,7 @@ from fringetrace.waves import degree, mm, nm, um
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import (
+        bsdf,
         crystals,
         elements,
         films,
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
         plates,
         polarisers,
         shapes,
+        spectra,
+        swatches,
         vectors,
         views,
     )
@@ -60,6 +63,7 @@ __all__ = [
     "Scene",
     "Surface",
     "bounds",
+    "bsdf",
     "budget",
     "complex_field",
     "crystals",
@@ -79,7 +83,9 @@ __all__ = [
     "plates",
     "polarisers",
     "shapes",
+    "spectra",
     "stream",
+    "swatches",
     "trace",
     "um",
     "vectors",
@@ -88,8 +94,8 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes", "phase",
-    "plates", "polarisers", "shapes", "vectors", "views",
+    "bsdf", "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes",
+    "phase", "plates", "polarisers", "shapes", "spectra", "swatches", "vectors", "views",
 )  # fmt: skip
 
 
