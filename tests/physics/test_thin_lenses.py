@@ -26,10 +26,11 @@ CONJUGATES = [
 ]  # fmt: skip
 
 
-def aperture(seed, count=6, radius=0.02):
-    """Points of the lens."""
+def aperture(seed, count=6, radius=0.02, bulge=0.0):
+    """Points of the lens, which may bulge out of its plane."""
     u, v = np.random.default_rng(seed).uniform(-radius, radius, (2, count))
-    return MIDDLE + np.outer(u, EAST) + np.outer(v, NORTH)
+    rise = bulge * (1.0 - (u * u + v * v) / radius**2)
+    return MIDDLE + np.outer(u, EAST) + np.outer(v, NORTH) + np.outer(rise, AXIS)
 
 
 def vector(row):
@@ -82,10 +83,12 @@ def conjugate(f, s, across, reverse):
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize(("f", "s"), CONJUGATES)
 @settings(deadline=None, max_examples=5)
-@given(seed=seeds, across=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)))
-def test_every_ray_of_an_object_point_has_the_same_path_to_its_image(f, s, reverse, seed, across):
+@given(
+    seed=seeds, across=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)), bulge=st.sampled_from([0, 0.01])
+)
+def test_every_ray_of_an_object_point_has_the_same_path_to_its_image(f, s, reverse, seed, across, bulge):
     source, image, travel = conjugate(f, s, across, reverse)
-    points = aperture(seed)
+    points = aperture(seed, bulge=bulge)
     _, branch = traced(IdealLens(MIDDLE, AXIS, f, s), points, bundle(points, source, travel), index=1.3)
     goal = bundle(points, image, travel)
     assert np.abs(branch.direction - goal / np.linalg.norm(goal, axis=1)[:, None]).max() < AIM
