@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fringetrace.bounds import Bounds, bounds
 from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
-from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.interfaces import Absorber, BeamSplitter, Dielectric, Metal, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -25,9 +25,11 @@ if TYPE_CHECKING:
     from fringetrace import (
         crystals,
         elements,
+        films,
         forms,
         gratings,
         instruments,
+        materials,
         meshes,
         phase,
         plates,
@@ -45,11 +47,13 @@ __all__ = [
     "BeamSplitter",
     "Bounds",
     "Budget",
+    "Dielectric",
     "Fate",
     "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
+    "Metal",
     "Mirror",
     "Paths",
     "Rays",
@@ -61,10 +65,12 @@ __all__ = [
     "crystals",
     "degree",
     "elements",
+    "films",
     "forms",
     "gratings",
     "instruments",
     "irradiance",
+    "materials",
     "meshes",
     "mm",
     "mutual_intensity",
@@ -82,8 +88,8 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "crystals", "elements", "forms", "gratings", "instruments", "meshes", "phase", "plates", "polarisers",
-    "shapes", "vectors", "views",
+    "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes", "phase",
+    "plates", "polarisers", "shapes", "vectors", "views",
 )  # fmt: skip
 
 
