@@ -29,7 +29,7 @@ def inside(rays, axis, n_o, n_e):
     return rows, *refracted(wave, -rays.normal, np.full(count, n_o), np.full(count, n_e), rows)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=30)
 @given(seed=seeds, axis=axes)
 def test_waves_inside_obey_the_crystal_and_the_face(seed, axis):
     rays, (n_o, n_e) = shower(seed, both=False), CALCITE
@@ -46,7 +46,7 @@ def test_waves_inside_obey_the_crystal_and_the_face(seed, axis):
     assert (np.einsum("ij,ij->i", wave, ray) > 0.0).all()
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=30)
 @given(seed=seeds)
 def test_equal_indices_make_snell(seed):
     rays = shower(seed, both=False)
@@ -64,7 +64,7 @@ def test_beyond_the_critical_angle_no_wave_goes_on():
         assert np.array_equal(branch.point, rays.point)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=30)
 @given(theta=st.floats(0.0, math.pi / 2))
 def test_normal_incidence_shifts_by_the_walk_off(theta):
     n_o, n_e = CALCITE

@@ -28,7 +28,7 @@ def through(element, field, direction=(0.0, 0.0, 1.0), wavelength=None):
     return branch.field[0]
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=30)
 @given(angle=angles, extinction=st.floats(0.0, 1.0))
 def test_malus(angle, extinction):
     passed = power(through(Polariser(at(angle), extinction), X)[None])[0]
@@ -43,7 +43,7 @@ def test_a_polariser_shows_slanted_rays_its_axis_across_them():
     assert through(Polariser(slanted, 0.25), Y, slanted) == pytest.approx([0.0, 0.5, 0.0], abs=ROUNDING)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=30)
 @given(angle=angles)
 def test_a_half_wave_plate_turns_by_twice_its_angle(angle):
     field = through(wave_plate(at(angle), 0.5), X)
@@ -91,7 +91,7 @@ def test_indices_of_a_retarder_may_depend_on_the_wavelength():
     assert plate.at(500e-9) == pytest.approx(2.0 * math.pi * 0.01 * 1e-5 / 500e-9, rel=1000 * EPS)
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=30)
 @given(angle=angles, retardance=st.floats(-10.0, 10.0), seed=st.integers(0, 2**32 - 1))
 def test_a_retarder_as_a_jones_matrix(angle, retardance, seed):
     rays = shower(seed)

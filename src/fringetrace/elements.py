@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
-from typing import ClassVar, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from fringetrace.waves import Array, ComplexArray, FloatArray
 PARALLEL = 8.0 * float(np.finfo(np.float64).eps)
 
 Index = float | Callable[[float], float]
+Waves = Literal["plane", "curved", "torn"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +76,13 @@ class Branch:
 class Element(Protocol):
     """Anything flat that sends rays on in a fixed number of branches.
 
-    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength.
+    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: how plane waves
+    leave it: as plane waves, all over; curved, as smooth ones; torn, since neighbours may fare differently.
     """
+
+    @property
+    def waves(self) -> Waves:
+        """How plane waves leave it."""
 
     @property
     def branches(self) -> int:
@@ -273,6 +279,7 @@ class Annulus:
     inner: float
     outer: float
 
+    waves: ClassVar[Waves] = "torn"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
@@ -329,6 +336,7 @@ class IdealLens:
     focal_length: float
     object_distance: float = np.inf
 
+    waves: ClassVar[Waves] = "curved"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False

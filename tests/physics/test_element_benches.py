@@ -107,16 +107,44 @@ def test_grating_orders_fall_where_the_grating_equation_says(reflects):
     assert ledger.absorbed / ledger.incident == pytest.approx(rest, rel=POWER)
 
 
+@pytest.mark.parametrize(("f", "expected"), [(100 * mm, 4.0), (-100 * mm, 4.0 / 9.0)])
+@pytest.mark.parametrize("kind", ["lens", "plate"])
+def test_light_behind_a_lens_is_as_dense_as_its_rays(kind, f, expected):
+    # half way to the focus a beam is half as wide; exactly, for slopes that grow with the offset
+    lens = IdealLens((0, 0, 0), Z, f) if kind == "lens" else zone_plate((0, 0, 0), Z, f)
+    ccd = camera(50 * mm, 0.02 * mm, (8, 8))
+    paths = ft.trace(ft.Scene([standing(lens, 0.0, "lens")]), beam(4 * mm, (64, 64)), ccd)
+    image = ft.irradiance(paths, LAMBDA)
+    # a zone plate's sine (against the tangent) is off by 3/2 (r / f)^2, and rays lean by as much
+    assert image == pytest.approx(np.full((8, 8), expected), rel=1e-10 if kind == "lens" else 1e-5)
+
+
+def test_polarised_beams_part_and_meet_again_as_wavefronts():
+    image = ft.irradiance(jamin_lebedeff(None, DIAGONAL), LAMBDA, method="wavefront")
+    # paths of 20 mm to a rounding of each of some ten steps
+    assert image == pytest.approx(np.ones((4, 4)), abs=2.0 * np.pi * 16 * EPS * 20 * mm / LAMBDA)
+
+
+def test_behind_pixels_and_stops_light_is_a_sum_of_rays():
+    stop = standing(Annulus((0, 0, 0), 1 * mm, 2 * mm), 0.0, "stop")
+    paths = ft.trace(ft.Scene([stop]), beam(5 * mm, (50, 50)), camera(5 * mm, 0.1 * mm, (50, 50)))
+    assert ft.field.method_for(paths) == "rays"
+    image = ft.irradiance(paths, LAMBDA)
+    assert set(np.round(image, 12).ravel()) == {0.0, 1.0}
+    with pytest.raises(ValueError, match="method: expected 'rays' behind stop, which tears wavefronts, got"):
+        ft.irradiance(paths, LAMBDA, method="wavefront")
+
+
 def jamin_lebedeff(delta, analyser, extra=()):
-    """Two calcite plates with a half-wave plate between, and a sample that one of the beams meets."""
+    """Two calcite plates with a half-wave plate between, and a sample, or none, for one of the beams."""
     plate = ShearPlate((1, 0, 1), 5 * mm, *CALCITE)
-    opd = delta * LAMBDA / (2.0 * np.pi)
+    opd = (delta or 0.0) * LAMBDA / (2.0 * np.pi)
     # the extraordinary beam is half a millimetre to the left
     sample = PhasePlate([[opd, 0.0]], (-0.25 * mm, 0, 0), X, Y, pitch=20 * mm, interpolation="nearest")
     surfaces = [
         standing(plate, 0.0, "first"),
         standing(wave_plate(DIAGONAL, 0.5), 2 * mm, "half-wave"),
-        standing(sample, 4 * mm, "sample"),
+        *([] if delta is None else [standing(sample, 4 * mm, "sample")]),
         standing(plate, 6 * mm, "second"),
         *extra,
         standing(Polariser(analyser), 10 * mm, "analyser"),

@@ -82,7 +82,7 @@ def conjugate(f, s, across, reverse):
 
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize(("f", "s"), CONJUGATES)
-@settings(deadline=None, max_examples=5)
+@settings(deadline=None, max_examples=3)
 @given(
     seed=seeds, across=st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3)), bulge=st.sampled_from([0, 0.01])
 )
@@ -105,7 +105,7 @@ def test_every_ray_of_an_object_point_has_the_same_path_to_its_image(f, s, rever
 
 
 @pytest.mark.parametrize(("f", "s"), CONJUGATES)
-@settings(deadline=None, max_examples=5)
+@settings(deadline=None, max_examples=3)
 @given(seed=seeds)
 def test_a_zone_plate_images_a_point_of_its_axis_like_the_ideal_lens(f, s, seed):
     source, _, travel = conjugate(f, s, (0.0, 0.0), False)
