@@ -76,8 +76,8 @@ class Branch:
 class Element(Protocol):
     """Anything flat that sends rays on in a fixed number of branches.
 
-    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: how plane waves
-    leave it: as plane waves, all over; curved, as smooth ones; torn, since neighbours may fare differently.
+    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: plane waves
+    leave it plane, curved, or torn (neighbouring rays may fare differently).
     """
 
     @property
@@ -183,8 +183,8 @@ def across(axis: FloatArray, direction: FloatArray) -> FloatArray:
     (n, 3) float64
         Unit, or 0 where the axis is along the ray.
     """
-    part = within(np.broadcast_to(axis, direction.shape), direction)
-    part = within(part, direction)  # once more: what rounding left along a ray close to the axis
+    # twice: what rounding leaves along a ray close to the axis
+    part = within(within(np.broadcast_to(axis, direction.shape), direction), direction)
     size = np.sqrt(dot(part, part))
     seen = size > PARALLEL
     return np.where(seen[:, None], part / np.where(seen, size, 1.0)[:, None], 0.0)
@@ -381,8 +381,8 @@ class IdealLens:
         size = np.sqrt(dot(chief, chief))
         skew, square = 2.0 * dot(chief, q), dot(q, q)
         arriving, leaving = chief + scaled(q, near), chief - scaled(q, far)
-        sums = [size + np.sqrt(dot(side, side)) for side in (arriving, leaving)]
-        sums = [np.where(total > 0.0, total, 1.0) for total in sums]
+        both = [size + np.sqrt(dot(side, side)) for side in (arriving, leaving)]
+        sums = [np.where(total > 0.0, total, 1.0) for total in both]
         return np.asarray((skew - far * square) / sums[1] - (skew + near * square) / sums[0])
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> IdealLens:

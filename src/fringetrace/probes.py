@@ -149,8 +149,8 @@ def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
     Returns
     -------
     list of (triangles,) int64
-        A number for the part that each triangle belongs to, one array a surface; below 0 on a form, and on
-        an element that curves plane waves.
+        A number for the part that each triangle belongs to, one array a surface; below 0 on a form, and
+        on elements that curve waves.
     """
     if "parts" not in scene.derived:
         scene.derived["parts"] = [_parts(surface) for surface in scene.surfaces]
@@ -164,12 +164,9 @@ def _parts(surface: Surface) -> npt.NDArray[np.int64]:
     flat = np.ones(len(mesh.faces), dtype=np.bool_)
     if surface.form is not None:
         flat = surface.form.fit(mesh.vertices, mesh.faces).along == 0
-    if getattr(surface.interface, "waves", "plane") != "plane":
+    elif getattr(surface.interface, "waves", "plane") != "plane":
         flat[:] = False
-    if not flat.all():
-        parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
-    if not flat.any():
-        return parts
+    parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces[flat]], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
