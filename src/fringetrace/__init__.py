@@ -24,6 +24,7 @@ from fringetrace.waves import degree, mm, nm, um
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import (
+        bsdf,
         crystals,
         cylinders,
         elements,
@@ -38,7 +39,9 @@ if TYPE_CHECKING:
         plates,
         polarisers,
         shapes,
+        spectra,
         spheres,
+        swatches,
         vectors,
         views,
     )
@@ -65,6 +68,7 @@ __all__ = [
     "Surface",
     "Validity",
     "bounds",
+    "bsdf",
     "budget",
     "complex_field",
     "crystals",
@@ -86,8 +90,10 @@ __all__ = [
     "plates",
     "polarisers",
     "shapes",
+    "spectra",
     "spheres",
     "stream",
+    "swatches",
     "trace",
     "um",
     "validity",
@@ -97,8 +103,8 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "crystals", "cylinders", "elements", "films", "forms", "gratings", "instruments", "lattices", "materials",
-    "meshes", "phase", "plates", "polarisers", "shapes", "spheres", "vectors", "views",
+    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "gratings", "instruments", "lattices", "materials",
+    "meshes", "phase", "plates", "polarisers", "shapes", "spectra", "spheres", "swatches", "vectors", "views",
 )  # fmt: skip
 
 
