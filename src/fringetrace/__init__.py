@@ -103,8 +103,9 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "gratings", "instruments", "lattices", "materials",
-    "meshes", "phase", "plates", "polarisers", "shapes", "spectra", "spheres", "swatches", "vectors", "views",
+    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "gratings", "instruments", "lattices",
+    "materials", "meshes", "phase", "plates", "polarisers", "shapes", "spectra", "spheres", "swatches",
+    "vectors", "views",
 )  # fmt: skip
 
 
