@@ -18,25 +18,32 @@ from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
 from fringetrace.scene import CCD, Beam, Gaussian, Scene, Surface
 from fringetrace.trace import stream, trace
+from fringetrace.validity import Validity, validity
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import (
+        bsdf,
         crystals,
+        cylinders,
         elements,
         films,
         forms,
         goniometer,
         gratings,
         instruments,
+        lattices,
         materials,
         meshes,
         phase,
         plates,
         polarisers,
         shapes,
+        spectra,
+        spheres,
         studies,
+        swatches,
         sweeps,
         vectors,
         views,
@@ -62,10 +69,13 @@ __all__ = [
     "Rays",
     "Scene",
     "Surface",
+    "Validity",
     "bounds",
+    "bsdf",
     "budget",
     "complex_field",
     "crystals",
+    "cylinders",
     "degree",
     "elements",
     "films",
@@ -74,6 +84,7 @@ __all__ = [
     "gratings",
     "instruments",
     "irradiance",
+    "lattices",
     "materials",
     "meshes",
     "mm",
@@ -83,19 +94,24 @@ __all__ = [
     "plates",
     "polarisers",
     "shapes",
+    "spectra",
+    "spheres",
     "stream",
     "studies",
+    "swatches",
     "sweeps",
     "trace",
     "um",
+    "validity",
     "vectors",
     "views",
 ]
 
 # rooms that are imported at first use
 _ROOMS = (
-    "crystals", "elements", "films", "forms", "goniometer", "gratings", "instruments", "studies",
-    "materials", "meshes", "phase", "plates", "polarisers", "shapes", "sweeps", "vectors", "views",
+    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "goniometer", "gratings",
+    "instruments", "lattices", "materials", "meshes", "phase", "plates", "polarisers", "shapes",
+    "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
 )  # fmt: skip
 
 

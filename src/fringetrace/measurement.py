@@ -11,17 +11,21 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace import labels
+from fringetrace import tables
 from fringetrace.bench import Bench, path_slope, pixel_centres
 from fringetrace.field import chosen
 from fringetrace.mesh import Mesh
 from fringetrace.meshes import interpolate_height
 from fringetrace.paths import Ledger
 from fringetrace.waves import Array, FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.tables import Dataset
 
 # A bend of this many waves a pixel is a step.
 STEP = 0.02
@@ -210,7 +214,7 @@ def staged(folder: Path) -> Iterator[Path]:
         raise
 
 
-def dataset(measurement: Measurement) -> labels.Dataset:
+def dataset(measurement: Measurement) -> Dataset:
     """Everything, labelled.
 
     Parameters
@@ -254,7 +258,7 @@ def dataset(measurement: Measurement) -> labels.Dataset:
         **{f"power_{name}": value for name, value in vars(m.ledger).items()},
         **{f"version_{name}": version(name) for name in LIBRARIES},
     }
-    return labels.dataset(variables, coordinates, attributes)
+    return tables.dataset(variables, coordinates, attributes)
 
 
 def write_netcdf(measurement: Measurement, path: Path) -> None:
@@ -265,7 +269,7 @@ def write_netcdf(measurement: Measurement, path: Path) -> None:
     measurement : Measurement
     path : Path
     """
-    labels.write_netcdf(dataset(measurement), path)
+    tables.write_netcdf(dataset(measurement), path)
 
 
 def counts(images: FloatArray, full_scale: float) -> Array:

@@ -13,7 +13,7 @@ from fringetrace.drawing import opengl, picture, show, unit_of
 from fringetrace.waves import Array, FloatArray, checked_wavelength
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from matplotlib.axes import Axes as Axes
     from matplotlib.figure import Figure
 
     from fringetrace.labels import DataArray
@@ -55,6 +55,23 @@ def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
     figure = Figure(figsize=(7.0, height))
     figure.subplots_adjust(left=0.11, right=0.85, bottom=0.65 / height, top=1.0 - 0.4 / height)
     axes: Axes = figure.add_subplot()
+    return axes
+
+
+def blank(width: float = 7.0, height: float = 4.0) -> Axes:
+    """Axes in a figure of their own.
+
+    Parameters
+    ----------
+    width, height : float, inches
+
+    Returns
+    -------
+    matplotlib Axes
+    """
+    from matplotlib.figure import Figure
+
+    axes: Axes = Figure(figsize=(width, height), layout="constrained").add_subplot()
     return axes
 
 
