@@ -11,7 +11,7 @@ import numpy as np
 from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
 
 if TYPE_CHECKING:
-    from fringetrace.labels import DataArray
+    from fringetrace.tables import DataArray
 
 # What there is to say, each under a word.
 Lines = list[tuple[str, str]]
@@ -172,10 +172,10 @@ def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
 
 def _write(table: DataArray, folder: Path) -> None:
     """brdf.nc, brdf.csv, spectra.png."""
-    from fringetrace import labels, views
+    from fringetrace import tables, views
 
-    labels.write_netcdf(table, folder / "brdf.nc")
-    labels.write_csv(table, folder / "brdf.csv")
+    tables.write_netcdf(table, folder / "brdf.nc")
+    tables.write_rows(table, folder / "brdf.csv")
     views.save(views.spectra(table), folder / "spectra.png")
 
 

@@ -13,13 +13,13 @@ from fringetrace.detectors import Cells, Cones, Detector, Pixels, checked_angles
 from fringetrace.farfield import FATES, Far, far_field
 from fringetrace.guards import FringetraceWarning
 from fringetrace.illumination import Setup, Source, footprint
-from fringetrace.labels import labelled
 from fringetrace.nufft import checked_wavelengths
 from fringetrace.scene import Scene
+from fringetrace.tables import array
 from fringetrace.waves import FloatArray
 
 if TYPE_CHECKING:
-    from fringetrace.labels import DataArray
+    from fringetrace.tables import DataArray
 
 __all__ = [
     "Cells",
@@ -131,7 +131,7 @@ def amplitudes(
         for t in theta
     ]
     unit = {"units": "m2", "long_name": "sum of area * amplitude", "method": method}
-    return labelled(np.array(sums), AXES, _coordinates(theta, phi, detector, waves), "amplitude", unit)
+    return array(np.array(sums), AXES, _coordinates(theta, phi, detector, waves), "amplitude", unit)
 
 
 def brdf(
@@ -249,7 +249,7 @@ def _table(
         "units": "sr-1", "long_name": "BRDF", "method": method, "detector": type(detector).__name__,
         "power_unaccounted": max(abs(sum(far.shares.values()) - 1.0) for far in fars),
     }  # fmt: skip
-    return labelled(values.reshape(*grid, *values.shape[1:]), AXES, coordinates, "brdf", attributes)
+    return array(values.reshape(*grid, *values.shape[1:]), AXES, coordinates, "brdf", attributes)
 
 
 def _check_same(theta: FloatArray, phi: FloatArray, detector: Detector) -> None:

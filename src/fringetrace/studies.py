@@ -14,16 +14,16 @@ from fringetrace.detectors import Cones, checked_angles
 from fringetrace.farfield import FATES
 from fringetrace.goniometer import AXES, brdf
 from fringetrace.interfaces import Mirror
-from fringetrace.labels import labelled
 from fringetrace.mesh import Mesh
 from fringetrace.nufft import checked_wavelengths
 from fringetrace.scene import Scene, Surface
 from fringetrace.shapes import rod_lattice
 from fringetrace.sweeps import grid, sweep
+from fringetrace.tables import array
 from fringetrace.waves import FloatArray, checked_length, degree
 
 if TYPE_CHECKING:
-    from fringetrace.labels import DataArray
+    from fringetrace.tables import DataArray
 
 # Distance of the rows in pitches, and how far every second one is shifted.
 ARRANGEMENTS = {"square": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (0.5 * np.sqrt(3.0), 0.5)}
@@ -197,6 +197,4 @@ def study(
         for name, value in vars(lattice).items()
         if name not in axes and value is not None
     }
-    return labelled(
-        values.reshape(*shape, *values.shape[1:]), (*axes, *AXES), coordinates, "brdf", attributes
-    )
+    return array(values.reshape(*shape, *values.shape[1:]), (*axes, *AXES), coordinates, "brdf", attributes)

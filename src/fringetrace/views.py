@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
     from matplotlib.figure import Figure
 
-    from fringetrace.labels import DataArray
+    from fringetrace.tables import DataArray
 
 __all__ = [
     "height",
