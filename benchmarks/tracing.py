@@ -102,7 +102,7 @@ def bouncing(make, side: int) -> dict:
 
 
 def matter(side: int) -> dict:
-    """The same 12 bounces off rods of glass, of which only reflected light is followed: mirrors, then media."""
+    """The same 12 bounces among mirrors, rods of glass (reflected light alone), and gold."""
     scene, beam = scenes.rods()
     mesh, beam = scene.surfaces[0].mesh, replace(beam, shape=(side, side))
     glass = ft.Scene([ft.Surface(mesh, ft.Dielectric("reflected"), "glass", back=1.5)])
@@ -244,8 +244,8 @@ def table(results: dict) -> str:
             michelson,
         ),
         (
-            "cost of a bounce in that box, 1 thread, times raw embreex's: mirrors / glass (reflected light), a "
-            "number a ray / the field as a vector / gold",
+            "cost of a bounce in that box, 1 thread, times raw embreex's: mirrors / glass (reflected light), "
+            "a number a ray / the field as a vector / gold",
             costs,
         ),
         (

@@ -11,7 +11,7 @@ Y = np.array([0.0, 1.0, 0.0])
 
 
 def stack(indices, thickness=(), size=1.0, films=None, interface=None):
-    """Faces one below the other from z = 0 down: media `indices`, layers between them `thickness` (metres)."""
+    """Faces one below the other from z = 0 down: media `indices`, layers between of `thickness` (metres)."""
     depth = -np.concatenate([[0.0], np.cumsum(thickness)])
     films = [None] * len(depth) if films is None else films
     surfaces = [
@@ -59,7 +59,7 @@ def branches(paths, polarisation=None):
 
 
 def summed(paths, wavelength, polarisation=None, upwards=True, point=(0.0, 0.0, 0.0), away=0.1):
-    """Coherent sum of what left up or down, as plane waves at a point: amplitude of power of the whole stack."""
+    """Coherent sum of what left up or down, as plane waves at a point: amplitude of power."""
     out = (paths.fate == ft.Fate.LEFT) & ((paths.direction[:, 2] > 0.0) == upwards)
     some = paths.where(out)
     back = ((np.asarray(point) - some.origin) * some.gradient).sum(axis=1)

@@ -10,7 +10,8 @@ import pytest
 import fringetrace as ft
 from fringetrace import forms, materials, media, nm, polarisers, shapes, um
 from fringetrace.films import Film
-from fringetrace.media import at_wavelength, materials as media_of, needs, optics, plain
+from fringetrace.media import at_wavelength, needs, optics, plain
+from fringetrace.media import materials as media_of
 
 PLATE = shapes.plate(1, 1)
 
@@ -142,7 +143,7 @@ def onto(scene, angle, wavelength):
 def test_light_that_is_bent_wants_a_new_trace():
     paths = onto(slab(), 0.3, 500 * nm)
     with pytest.raises(
-        ValueError, match="expected that of the trace, 5e-07 m, since .* is dispersive and light is bent"
+        ValueError, match=r"expected that of the trace, 5e-07 m, since .* is dispersive and light is bent"
     ):
         ft.complex_field(paths, 600 * nm, "rays")
     # what is bent, but not seen, does not matter

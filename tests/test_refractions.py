@@ -1,17 +1,12 @@
 """Snell, Fresnel and polarised fields of the tracer beside a twin that solves Maxwell's conditions."""
 
-import math
-
 import maxwell
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import fringetrace as ft
 from fringetrace import Fate, Mesh, forms, shapes
-from fringetrace.vectors import rotation
 
 # Optical paths of two programs, relative: both add up some ten segments; curved and slanting faces multiply
 # what a point is off.

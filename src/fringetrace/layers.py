@@ -137,7 +137,7 @@ def fresnel(first, q1, last, q2):
 
 @part
 def clear(first, last, q):
-    """`bare` between media that do not absorb, from the real normal part before; all but the phases is real."""
+    """`bare` between media that do not absorb, from the real normal part before: real, but for phases."""
     square = (last - first) * (last + first) + q * q
     deep = np.sqrt(abs(square))
     a, b = last * last * q, first * first * deep

@@ -294,8 +294,8 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
         return replace(paths, wavelength=wavelength)
     if paths.contradictions is not None and paths.contradictions.any():
         raise ValueError(
-            f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since rays came to surfaces in "
-            f"media that these do not have there, got {wavelength:.6g} m: trace once a wavelength"
+            f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since rays came to surfaces "
+            f"in media that these do not have there, got {wavelength:.6g} m: trace once a wavelength"
         )
     if (paths.bend[seen] > STRAIGHT).any():
         raise ValueError(

@@ -1,9 +1,8 @@
-"""Fields behind glass by the wavefront method: fringes of slabs and wedges, other wavelengths, the error budget."""
+"""Fields behind glass by the wavefront method: fringes of slabs and wedges, other wavelengths, the budget."""
 
 import math
 
 import budget as cases
-import glass
 import numpy as np
 import pytest
 

@@ -1,4 +1,4 @@
-"""Rays through faces of glass and metal: Snell, Brewster, total reflection, prisms, slabs, wedges, cylinders."""
+"""Rays through faces of glass and metal: Snell, Brewster, total reflection, prisms, slabs, cylinders."""
 
 import cmath
 import math
