@@ -235,7 +235,8 @@ def test_contradictions_are_counted_and_told():
     text = guards.contradicted(inside)
     assert text == (
         "media contradict: 1 rays came to 'ball', between vacuum and n=1.5 (front and back), in another "
-        "medium; close its mesh, turn its normals to the front, name the media of what lies before it, or take the "
+        "medium; close its mesh, turn its normals to the front, name the media of what lies before it, or "
+        "take the "
         "bodies apart where they overlap"
     )
     # normals the wrong way round
