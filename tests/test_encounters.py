@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 import fringetrace as ft
 from fringetrace import Fate, forms, guards, nm, shapes, um
 from fringetrace.films import Film
-from fringetrace.paths import COLUMNS, join, project
+from fringetrace.landing import project
+from fringetrace.paths import COLUMNS, join
 
 LEDGER = 1e-12
 MATTER = ("medium", "index", "lengths", "field", "dropped", "bend")

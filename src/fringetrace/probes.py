@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.interfaces import Metal
-from fringetrace.paths import Paths, along
+from fringetrace.landing import along, landed
+from fringetrace.paths import Paths
 from fringetrace.rays import launch_at
 from fringetrace.scene import CCD, Beam, Scene, Surface
-from fringetrace.sheets import landed
 from fringetrace.trace import trace
 from fringetrace.triangles import weld
 from fringetrace.waves import Array, FloatArray
