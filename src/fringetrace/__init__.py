@@ -22,7 +22,7 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, meshes, phase, shapes, vectors, views
+    from fringetrace import forms, instruments, lenses, meshes, phase, shapes, vectors, views
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -49,6 +49,7 @@ __all__ = [
     "forms",
     "instruments",
     "irradiance",
+    "lenses",
     "meshes",
     "mm",
     "mutual_intensity",
@@ -63,7 +64,7 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = ("forms", "instruments", "lenses", "meshes", "phase", "shapes", "vectors", "views")
 
 
 def __getattr__(name: str) -> Any:
