@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.forms import Conic, Cylinder, Sphere
-from fringetrace.interfaces import Absorber, Dielectric, Interface
+from fringetrace.forms import Conic, Cylinder, Form, Sphere
+from fringetrace.interfaces import Absorber, Dielectric, Metal
+from fringetrace.materials import Material, as_material
 from fringetrace.mesh import Mesh
 from fringetrace.scene import Surface
 from fringetrace.shapes import checked_length, icosphere
@@ -23,7 +24,7 @@ from fringetrace.triangles import IndexArray
 from fringetrace.vectors import checked_direction, checked_vector, rotation
 from fringetrace.waves import FloatArray
 
-Glass = Any
+Glass = Material | complex | str | None
 Z = np.array([0.0, 0.0, 1.0])
 Vector = npt.ArrayLike
 
@@ -50,8 +51,8 @@ def lens(
     terms: Sequence[Sequence[float]] | None = None,
     vertex: Vector = (0.0, 0.0, 0.0),
     axis: Vector = (0.0, 0.0, 1.0),
-    interface: Interface | Sequence[Interface] = Dielectric(),  # noqa: B008 - frozen
-    edge: Interface = Absorber(),  # noqa: B008 - frozen
+    interface: Any = Dielectric(),  # noqa: B008 - frozen
+    edge: Any = Absorber(),  # noqa: B008 - frozen
     rings: int | None = None,
     name: str = "lens",
 ) -> tuple[Surface, ...]:
@@ -64,7 +65,7 @@ def lens(
         if the centre lies beyond the vertex, `math.inf` for a plane.
     thicknesses : (k - 1,) metres
         Along the axis, from each vertex to the next.
-    glasses : (k - 1,) of materials, or of numbers (indices)
+    glasses : (k - 1,) of Material, or index, or name
         Between each face and the next; None: the scene's medium, an air gap.
     diameter : float, metres
         Of all faces. Their rims are polygons within this circle, of six times `rings` corners.
@@ -115,13 +116,13 @@ def lens(
     caps = [_cap(face, profile, rings) for face, profile in zip(faces, profiles, strict=True)]
     media = (None, *glasses, None)
     surfaces = [
-        Surface(caps[i], interfaces[i], f"{name} {i + 1}", _exact(face), front=media[i], back=media[i + 1])
+        _surface(caps[i], interfaces[i], f"{name} {i + 1}", _exact(face), media[i], media[i + 1])
         for i, face in enumerate(faces)
     ]
     for i, glass in enumerate(glasses):
         if glass is not None and (wall := _wall(caps[i], caps[i + 1], 6 * rings)) is not None:
             around = Cylinder(np.zeros(3), Z, half)
-            surfaces.append(Surface(wall, edge, f"{name} edge {i + 1}", around, front=None, back=glass))
+            surfaces.append(_surface(wall, edge, f"{name} edge {i + 1}", around, None, glass))
     turn = _turn(axis)
     return tuple(surface.moved(vertex, turn) for surface in surfaces)
 
@@ -136,7 +137,7 @@ def plano_convex(
     radius : float, metres
         Of the curved face, positive; negative: a plano-concave lens.
     thickness : float, metres
-    glass : material, or a number
+    glass : Material, or index, or name
     diameter : float, metres
     flat_first : bool
         Light meets the flat face first.
@@ -162,7 +163,7 @@ def biconvex(
     radius : float, metres
         Of both faces, positive; negative: a biconcave lens.
     thickness : float, metres
-    glass : material, or a number
+    glass : Material, or index, or name
     diameter : float, metres
     more
         As `lens` has them.
@@ -189,7 +190,7 @@ def plano_hyperbola(
     index : float
         Of the glass, relative to the medium around, at the wavelength at which it shall be true.
     thickness : float, metres
-    glass : material, or a number
+    glass : Material, or index, or name
     diameter : float, metres
     more
         As `lens` has them.
@@ -215,7 +216,7 @@ def ball(
     glass: Glass,
     *,
     centre: Vector = (0.0, 0.0, 0.0),
-    interface: Interface = Dielectric(),  # noqa: B008 - frozen
+    interface: Any = Dielectric(),  # noqa: B008 - frozen
     name: str = "ball",
 ) -> Surface:
     """A ball lens.
@@ -223,7 +224,7 @@ def ball(
     Parameters
     ----------
     diameter : float, metres
-    glass : material, or a number
+    glass : Material, or index, or name
     centre : (3,) metres
     interface : Interface
     name : str
@@ -239,10 +240,8 @@ def ball(
         If the diameter is not positive.
     """
     radius = 0.5 * checked_length(diameter, "ball diameter")
-    mesh = icosphere(radius, BALL).moved(centre)
-    return Surface(
-        mesh, interface, name, Sphere(checked_vector(centre, "ball centre"), radius), front=None, back=glass
-    )
+    sphere = Sphere(checked_vector(centre, "ball centre"), radius)
+    return _surface(icosphere(radius, BALL).moved(centre), interface, name, sphere, None, glass)
 
 
 def focal_lengths(
@@ -275,6 +274,16 @@ def focal_lengths(
         height += slope * way / after
         before = after
     return (math.inf, math.inf) if slope == 0.0 else (-1.0 / slope, -height / slope)
+
+
+def _surface(
+    mesh: Mesh, interface: Any, name: str, form: Form | None, front: Glass, back: Glass
+) -> Surface:
+    """A surface, with its media where it parts any."""
+    if isinstance(interface, (Dielectric, Metal)):
+        media = [None if medium is None else as_material(medium, f"{name} glass") for medium in (front, back)]
+        return Surface(mesh, interface, name, form, *media)
+    return Surface(mesh, interface, name, form)
 
 
 def _check_counts(faces: int, **given: tuple[Sequence[Any], int]) -> None:
