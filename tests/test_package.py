@@ -14,10 +14,10 @@ import fringetrace as ft
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = {path.stem: ast.parse(path.read_text()) for path in Path(ft.__file__).parent.glob("*.py")}
 # What a table of libraries calls by another name than an import statement.
-MODULE = {"scikit-image": "skimage"}
+MODULE = {"scikit-image": "skimage", "pyyaml": "yaml"}
 HEAVY = [
     "numba", "embreex", "trimesh", "prysm", "scipy", "skimage", "matplotlib", "pyvista", "vtk", "vtkmodules",
-    "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich", "PIL",
+    "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich", "PIL", "yaml",
 ]  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from fringetrace.bounds import Bounds, bounds
 from fringetrace.budget import Budget, budget
 from fringetrace.field import complex_field, irradiance, mutual_intensity
-from fringetrace.interfaces import Absorber, BeamSplitter, Mirror
+from fringetrace.interfaces import Absorber, BeamSplitter, Dielectric, Metal, Mirror
 from fringetrace.mesh import Mesh
 from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
@@ -22,7 +22,23 @@ from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
-    from fringetrace import forms, instruments, lenses, meshes, phase, shapes, vectors, views
+    from fringetrace import (
+        crystals,
+        elements,
+        films,
+        forms,
+        gratings,
+        instruments,
+        lenses,
+        materials,
+        meshes,
+        phase,
+        plates,
+        polarisers,
+        shapes,
+        vectors,
+        views,
+    )
     from fringetrace.guards import FringetraceWarning
 
 __all__ = [
@@ -32,11 +48,13 @@ __all__ = [
     "BeamSplitter",
     "Bounds",
     "Budget",
+    "Dielectric",
     "Fate",
     "FringetraceWarning",
     "Gaussian",
     "Ledger",
     "Mesh",
+    "Metal",
     "Mirror",
     "Paths",
     "Rays",
@@ -45,16 +63,23 @@ __all__ = [
     "bounds",
     "budget",
     "complex_field",
+    "crystals",
     "degree",
+    "elements",
+    "films",
     "forms",
+    "gratings",
     "instruments",
     "irradiance",
     "lenses",
+    "materials",
     "meshes",
     "mm",
     "mutual_intensity",
     "nm",
     "phase",
+    "plates",
+    "polarisers",
     "shapes",
     "stream",
     "trace",
@@ -64,7 +89,10 @@ __all__ = [
 ]
 
 # rooms that are imported at first use
-_ROOMS = ("forms", "instruments", "lenses", "meshes", "phase", "shapes", "vectors", "views")
+_ROOMS = (
+    "crystals", "elements", "films", "forms", "gratings", "instruments", "lenses", "materials", "meshes",
+    "phase", "plates", "polarisers", "shapes", "vectors", "views",
+)  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:

@@ -363,7 +363,7 @@ def centred(paths: Paths, parts: int = 1) -> Paths:
     u, v, _ = paths.ccd.axes
     fine = paths.pixel * parts
     shift = (np.floor(fine) + 0.5 - fine) * (paths.ccd.pitch / parts)
-    continued = shift[:, 0] * (paths.direction @ v) + shift[:, 1] * (paths.direction @ u)
+    continued = shift[:, 0] * (paths.gradient @ v) + shift[:, 1] * (paths.gradient @ u)
     return replace(paths, length=paths.length + continued)
 
 

@@ -55,10 +55,11 @@ def bounds(paths: Paths) -> Bounds:
     """Carry the rounding of float64 through the bounces of each path.
 
     Errors of position, direction and optical path are carried as a covariance by the linear map of
-    each segment and bounce: dp' = dp + L dd, onto the surface along the ray; dd' = R dd - 2 ((d.dn) n
-    + (d.n) dn), dn = C dp, with the curvature C of the form: on a rod of radius r the error
-    grows by about 1 + 2 L / (r cos) a bounce. Facets are flat: they let errors grow only with the way.
-    Each point adds a rounding of its coordinates, each direction one of 1.
+    each segment and bounce: dp' = dp + L dd, onto the surface along the ray; off a mirror
+    dd' = R dd - 2 ((d.dn) n + (d.n) dn), dn = C dp, with the curvature C of the form, and alike by
+    Snell's law: on a rod of radius r the error grows by about 1 + 2 L / (r cos) a bounce. Facets are
+    flat: they let errors grow only with the way. Each point adds a rounding of its coordinates, each
+    direction one of 1.
 
     Parameters
     ----------
@@ -82,9 +83,10 @@ def bounds(paths: Paths) -> Bounds:
 
 def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
     """`Bounds` of some paths. Rows and columns of the covariance: position, direction, optical path."""
-    from fringetrace.contacts import legs
+    from fringetrace.contacts import indices, legs
 
     normal, bend = _tables(paths)
+    index = indices(paths)
     length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
     assert paths.points is not None
     size = np.nanmax(np.abs(paths.points), axis=(1, 2)) * ROUNDING
@@ -100,13 +102,16 @@ def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
             across = np.where(ends[:, None], 0.0, normal[here, min(k, normal.shape[1] - 1)])
             if paths.ccd is not None:
                 across[ends] = paths.ccd.axes[2]
-            step = _flight(direction[here, k], length[here, k], across)
+            step = _flight(direction[here, k], length[here, k], across, index[here, k])
             if not ends.all():
                 on = ~ends
                 rows = here[on]
-                step[on] = _turn(direction[rows, k : k + 2], normal[rows, k], bend[rows, k]) @ step[on]
+                turn = _turn(
+                    direction[rows, k : k + 2], index[rows, k : k + 2], normal[rows, k], bend[rows, k]
+                )
+                step[on] = turn @ step[on]
             spread[here] = step @ spread[here] @ np.swapaxes(step, 1, 2)
-            noise[here, 6] = ROUNDING * np.abs(length[here, : k + 1]).sum(axis=1)
+            noise[here, 6] = ROUNDING * np.abs(length[here, : k + 1] * index[here, : k + 1]).sum(axis=1)
             spread[here] += np.einsum("ni,ij->nij", noise[here] ** 2, np.eye(7))
         sizes = (np.trace(spread[:, a:b, a:b], axis1=1, axis2=2) for a, b in ((0, 3), (3, 6), (6, 7)))
         position, turn, path = (DEVIATIONS * np.sqrt(np.nan_to_num(s, nan=np.inf)) for s in sizes)
@@ -125,7 +130,7 @@ def _tables(paths: Paths) -> tuple[FloatArray, FloatArray]:
     return normal, bend
 
 
-def _flight(direction: FloatArray, length: FloatArray, normal: FloatArray) -> FloatArray:
+def _flight(direction: FloatArray, length: FloatArray, normal: FloatArray, index: FloatArray) -> FloatArray:
     """Maps (n, 7, 7) of errors over a segment, onto the plane that it ends on."""
     count = len(direction)
     facing = np.einsum("ni,ni->n", direction, normal)
@@ -134,20 +139,27 @@ def _flight(direction: FloatArray, length: FloatArray, normal: FloatArray) -> Fl
     step = np.zeros((count, 7, 7))
     step[:, :3, :3], step[:, :3, 3:6] = onto, onto * length[:, None, None]
     step[:, 3:6, 3:6] = np.eye(3)
-    step[:, 6, :3] = -normal / facing[:, None]
-    step[:, 6, 3:6] = -normal * (length / facing)[:, None]
+    step[:, 6, :3] = -normal * (index / facing)[:, None]
+    step[:, 6, 3:6] = -normal * (index * length / facing)[:, None]
     step[:, 6, 6] = 1.0
     return step
 
 
-def _turn(direction: FloatArray, normal: FloatArray, bend: FloatArray) -> FloatArray:
-    """Maps (n, 7, 7) of errors at a bounce; `direction` (n, 2, 3) before and after it."""
-    into = direction[:, 0]
-    facing = np.einsum("ni,ni->n", into, normal)
-    reflected = np.einsum("ni,ni->n", direction[:, 1], normal) * facing < 0.0
+def _turn(direction: FloatArray, index: FloatArray, normal: FloatArray, bend: FloatArray) -> FloatArray:
+    """Maps (n, 7, 7) of errors at a bounce; `direction` (n, 2, 3), `index` (n, 2) before and after it.
+
+    From n' d' = n d + G nu, G = n' c' - n c with cosines c to the normal nu (-2 n c off a mirror).
+    """
+    before, after = index[:, 0], index[:, 1]
+    into, out = (np.einsum("ni,ni->n", direction[:, k], normal) for k in (0, 1))
+    gain = after * out - before * into
+    # d(n' c') = n^2 c / (n' c') dc
+    change = before * (before * into / (after * out) - 1.0)
+    lever = change[:, None, None] * np.einsum("ni,nj->nij", normal, direction[:, 0])
+    lever += gain[:, None, None] * np.eye(3)
     step = np.tile(np.eye(7), (len(normal), 1, 1))
-    mirror = np.eye(3) - 2.0 * np.einsum("ni,nj->nij", normal, normal)
-    lever = np.einsum("ni,nj->nij", normal, into) + facing[:, None, None] * np.eye(3)
-    step[reflected, 3:6, 3:6] = mirror[reflected]
-    step[reflected, 3:6, :3] = -2.0 * (lever @ bend)[reflected]
+    step[:, 3:6, 3:6] = before[:, None, None] * np.eye(3)
+    step[:, 3:6, 3:6] += change[:, None, None] * np.einsum("ni,nj->nij", normal, normal)
+    step[:, 3:6, :3] = lever @ bend
+    step[:, 3:6] /= after[:, None, None]
     return step

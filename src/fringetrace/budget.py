@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fringetrace.media import at_wavelength
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import Beam
 from fringetrace.trace import trace
@@ -103,7 +104,7 @@ def budget(paths: Paths, wavelength: float, method: str = "auto") -> Budget:
     from fringetrace import sampling
     from fringetrace.field import chosen
 
-    checked_wavelength(wavelength)
+    paths = at_wavelength(paths, checked_wavelength(wavelength))
     if paths.ccd is None:
         raise ValueError("budget: expected paths traced onto a CCD, got paths without one")
     if not isinstance(paths.source, Beam):
@@ -140,7 +141,9 @@ def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
     assert isinstance(paths.source, Beam)
     bounces = int(paths.bounces[paths.fate == Fate.DETECTED].max(initial=0))
     beam = replace(paths.source, shape=shape)
-    return trace(paths.scene, beam, paths.ccd, max_bounces=bounces, record=record)
+    return trace(
+        paths.scene, beam, paths.ccd, wavelength=paths.wavelength, max_bounces=bounces, record=record
+    )
 
 
 def _shape(paths: Paths) -> tuple[int, int]:
@@ -192,9 +195,10 @@ def hit_error(paths: Paths, wavelength: float) -> float:
 def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, float] | None]:
     """What it costs that facets are not the smooth surface behind them.
 
-    A facet that stands off by s makes a path longer by 2 s cos(incidence). One that leans by e turns
-    the ray by 2 e: after a way of L it lands 2 e L beside its place, where the true wave, narrowed to
-    a part m of its width, is behind or ahead by L (2 e)^2 / 2 m.
+    A facet that stands off by s makes a path longer by s (n' d' - n d) along its normal: 2 s cos(incidence)
+    off a mirror. One that leans by e turns the ray by g e, 2 e off a mirror: after a way of L it lands
+    g e L beside its place, where the true wave, narrowed to a part m of its width, is behind or ahead
+    by n' L (g e)^2 / 2 m.
 
     Parameters
     ----------
@@ -209,8 +213,9 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
     (name, float) or None
         The surface that costs most, and the largest error of a path by it, in waves.
     """
-    from fringetrace.contacts import flattened, legs, met, shifted
+    from fringetrace.contacts import flattened, indices, legs, leverage, met, shifted
 
+    index = indices(paths)
     length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
     onward = np.cumsum(length[:, ::-1], axis=1)[:, ::-1]
     narrow = narrowed(paths)
@@ -220,7 +225,9 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
         offset, lean = flattened(bounces)
         off = np.asarray(shifted(paths, bounces, offset, direction), dtype=np.float64)
         way = np.abs(onward[bounces.path, bounces.bounce + 1]) / narrow[bounces.path]
-        beside = np.bincount(bounces.path, 2.0 * way * (lean**2).sum(axis=1), len(paths))
+        turned = leverage(bounces, direction, index) ** 2 * (lean**2).sum(axis=1)
+        turned *= 0.5 * index[bounces.path, bounces.bounce + 1]
+        beside = np.bincount(bounces.path, way * turned, len(paths))
         stood, leant = stood + off, leant + beside
         worst[bounces.surface.name] = float(np.hypot(off, beside).max() / wavelength)
     costliest = max(worst.items(), key=lambda item: item[1], default=None)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fringetrace.crossings import Fit, LevelFit, dot
 from fringetrace.facets import standoff
+from fringetrace.media import materials
 from fringetrace.patches import Patches
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import Beam, Surface
@@ -95,6 +96,46 @@ def legs(paths: Paths) -> tuple[Array, Array]:
     direction[rows, last] = final
     length[rows, last] = (step[rows, last] * final).sum(axis=1)
     return np.where(np.isfinite(length), length, 0.0), np.nan_to_num(direction)
+
+
+def indices(paths: Paths) -> FloatArray:
+    """Real refractive index on each segment of recorded paths.
+
+    Parameters
+    ----------
+    paths : Paths
+        Traced with record=True.
+
+    Returns
+    -------
+    (m, b + 1) float64
+        Before each bounce, and behind the last.
+    """
+    assert paths.points is not None
+    index = np.ones((len(paths), paths.points.shape[1] - 1))
+    if paths.medium is None:
+        return index
+    known = {m: complex(m.index(paths.wavelength or 1.0)).real for m in materials(paths.scene)}
+    direction = np.asarray(legs(paths)[1], dtype=np.float64)
+    index[:] = np.nan
+    index[:, 0] = known[paths.scene.around]
+    for bounces in met(paths):
+        surface = bounces.surface
+        if not surface.boundary:
+            continue
+        onward = direction[bounces.path, bounces.bounce + 1]
+        front = np.einsum("ni,ni->n", facing(bounces), onward) > 0.0
+        before, behind = (known[side or paths.scene.around] for side in (surface.front, surface.back))
+        index[bounces.path, bounces.bounce + 1] = np.where(front, before, behind)
+    # as it was, where no boundary changed it
+    latest = np.maximum.accumulate(np.where(np.isnan(index), 0, np.arange(index.shape[1])), axis=1)
+    return np.take_along_axis(index, latest, axis=1)
+
+
+def facing(bounces: Met) -> FloatArray:
+    """Normal (n, 3) of the facet at each bounce, towards the front."""
+    corners = _corners(bounces)
+    return unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
 
 
 def _corners(bounces: Met) -> FloatArray:
@@ -215,7 +256,7 @@ def _level(bounces: Met, on: Array, direction: FloatArray) -> tuple[FloatArray, 
 
 
 def shifted(paths: Paths, bounces: Met, offset: Array, turn: Array) -> Array:
-    """What it does to the path that a mirror stands somewhere else: -(d_out - d_in) . offset.
+    """What it does to the path that a surface stands somewhere else: -(n' d_out - n d_in) . offset.
 
     Parameters
     ----------
@@ -233,10 +274,42 @@ def shifted(paths: Paths, bounces: Met, offset: Array, turn: Array) -> Array:
         Summed over the bounces of each path. By Fermat's principle, what directions and places
         along the surfaces err does not count, to first order.
     """
-    turned = turn[bounces.path, bounces.bounce + 1] - turn[bounces.path, bounces.bounce]
+    index = indices(paths)
+    after, before = (bounces.path, bounces.bounce + 1), (bounces.path, bounces.bounce)
+    turned = index[after][:, None] * turn[after] - index[before][:, None] * turn[before]
     error = np.zeros(len(paths), dtype=EXTENDED)
     np.add.at(error, bounces.path, -(turned * offset).sum(axis=1))
     return error
+
+
+def _lengths(paths: Paths) -> FloatArray:
+    """Optical paths, without what thin elements add."""
+    if paths.lengths is None or not any(hasattr(s.interface, "act") for s in paths.scene.surfaces):
+        return paths.length
+    known = [complex(m.index(paths.wavelength or 1.0)).real for m in materials(paths.scene)]
+    return np.asarray(paths.lengths @ np.array(known), dtype=np.float64)
+
+
+def leverage(bounces: Met, direction: FloatArray, index: FloatArray) -> FloatArray:
+    """How far rays turn at each bounce where the surface turns by 1: 2 off a mirror.
+
+    From Snell's law, n' d' = n d + (n' c' - n c) nu, with cosines c to the normal nu.
+
+    Parameters
+    ----------
+    bounces : Met
+    direction : (m, b + 1, 3) float64
+    index : (m, b + 1) float64
+
+    Returns
+    -------
+    (n,) float64
+    """
+    normal = facing(bounces)
+    after, before = (bounces.path, bounces.bounce + 1), (bounces.path, bounces.bounce)
+    out = index[after] * np.einsum("ni,ni->n", direction[after], normal)
+    into = index[before] * np.einsum("ni,ni->n", direction[before], normal)
+    return np.asarray(np.abs((out - into) / out), dtype=np.float64)
 
 
 def rounding(paths: Paths) -> FloatArray:
@@ -259,20 +332,21 @@ def rounding(paths: Paths) -> FloatArray:
         float64 (some machines), or behind a form, as large as the roundings of this comparison.
     """
     length, direction = legs(paths)
-    error = paths.length.astype(EXTENDED) - length.sum(axis=1)
+    index = indices(paths)
+    error = _lengths(paths).astype(EXTENDED) - (length * index).sum(axis=1)
     for bounces in met(paths):
         error += shifted(paths, bounces, off(bounces), direction)
     assert paths.points is not None
     if isinstance(paths.source, Beam):  # the phase is 0 on its rectangle
         start = paths.points[:, 0].astype(EXTENDED) - paths.source.centre
         along = paths.source.axes[2].astype(EXTENDED)
-        error -= start @ (along / np.sqrt((along**2).sum()))
+        error -= index[:, 0] * (start @ (along / np.sqrt((along**2).sum())))
     elif paths.source.length is not None:
         error -= paths.source.length[paths.ray]
     if paths.ccd is not None:
         seen = np.flatnonzero(paths.fate == Fate.DETECTED)
         normal = paths.ccd.axes[2].astype(EXTENDED)
         beyond = (paths.origin[seen].astype(EXTENDED) - paths.ccd.centre) @ normal - paths.ccd.focus
-        facing = direction[seen, paths.bounces[seen]] @ normal
-        error[seen] += beyond * facing
+        last = paths.bounces[seen]
+        error[seen] += beyond * (direction[seen, last] @ normal) * index[seen, last]
     return np.asarray(error, dtype=np.float64)

@@ -8,7 +8,8 @@ from itertools import chain, groupby
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.paths import Paths, join, screen
+from fringetrace.media import at_wavelength
+from fringetrace.paths import Paths, along, join, screen
 from fringetrace.scene import Beam
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
 
@@ -59,7 +60,7 @@ def complex_field(
     paths : Paths, or an iterable of them
         From `trace`, or chunk by chunk from `stream`; of several coherent beams, one after the other.
     wavelength : float, metres
-        Vacuum wavelength. Another wavelength needs no new trace.
+        Vacuum wavelength. Another one needs no new trace, unless media bend it another way.
     method : {"auto", "wavefront", "rays"}
         "wavefront": neighbouring rays of a `Beam` with the same path span a sheet, whose mean field
         over each pixel is found; overlapping sheets add. See `irradiance`.
@@ -75,16 +76,18 @@ def complex_field(
     Returns
     -------
     (rows, columns) complex128, or (groups, rows, columns)
-        A ray sum runs in the order of the rays: the same bits for any chunk size.
+        Of light with a polarisation (3, rows, columns), or (groups, 3, rows, columns): along the CCD's
+        columns, rows and normal. A ray sum runs in the order of the rays: the same bits for any chunk size.
 
     Raises
     ------
     ValueError
-        For a wavelength that is none, an unknown method, paths without a CCD, or no paths at all;
+        For a wavelength that is none, or goes another way than that of the trace; for an unknown method,
+        paths without a CCD, or no paths at all;
         with "wavefront", for paths that are not of a beam; for groups that do not fit the paths.
     """
     wavelength = checked_wavelength(wavelength)
-    method, parts = _method(paths, method)
+    method, parts = _method(paths, method, wavelength)
     if method == "wavefront":
         mean = _wavefront(parts, wavelength, groups, True, half_wave_loss)[0]
         return mean if groups is not None else np.ascontiguousarray(mean[0])
@@ -128,12 +131,28 @@ def mutual_intensity(
         As in `complex_field`.
     """
     wavelength = checked_wavelength(wavelength)
-    method, parts = _method(paths, method)
+    method, parts = _method(paths, method, wavelength)
     if method == "wavefront":
         return _wavefront(parts, wavelength, groups, False, half_wave_loss)[1]
+    return products(complex_field(parts, wavelength, method, half_wave_loss, groups))
+
+
+def products(fields: ComplexArray) -> ComplexArray:
+    """E_m conj(E_n) of fields, summed over the components of light with a polarisation.
+
+    Parameters
+    ----------
+    fields : (groups, rows, columns) complex128, or (groups, 3, rows, columns)
+
+    Returns
+    -------
+    (groups, groups, rows, columns) complex128
+    """
     from fringetrace.quadrature import mutual_products
 
-    return mutual_products(complex_field(parts, wavelength, method, half_wave_loss, groups))
+    if fields.ndim == 3:
+        return mutual_products(fields)
+    return np.asarray(sum(mutual_products(fields[:, k]) for k in range(3)), dtype=np.complex128)
 
 
 def irradiance(
@@ -160,11 +179,12 @@ def irradiance(
         As in `complex_field`.
     """
     wavelength = checked_wavelength(wavelength)
-    method, parts = _method(paths, method)
+    method, parts = _method(paths, method, wavelength)
     if method == "wavefront":
         mutual = _wavefront(parts, wavelength, None, False, half_wave_loss)[1]
         return np.ascontiguousarray(mutual[0, 0].real)
-    return np.asarray(np.abs(_sum(parts, wavelength, half_wave_loss)) ** 2, dtype=np.float64)
+    squares = np.abs(_sum(parts, wavelength, half_wave_loss)) ** 2
+    return np.asarray(squares if squares.ndim == 2 else squares.sum(axis=0), dtype=np.float64)
 
 
 def chosen(paths: Paths, method: str) -> str:
@@ -189,15 +209,15 @@ def chosen(paths: Paths, method: str) -> str:
     return method_for(paths) if method == "auto" else method
 
 
-def _method(paths: Paths | Iterable[Paths], method: str) -> tuple[str, Iterable[Paths]]:
-    """The method, "auto" resolved, and the paths in parts, of which there is at least one."""
+def _method(paths: Paths | Iterable[Paths], method: str, wavelength: float) -> tuple[str, Iterable[Paths]]:
+    """The method, "auto" resolved, and the paths at a wavelength in parts, of which there is at least one."""
     rest = iter((paths,) if isinstance(paths, Paths) else paths)
     first = next(rest, None)
     if first is None:
         raise ValueError("field: expected at least one Paths, got none")
     if first.ccd is None:
         raise ValueError("field: expected paths traced onto a CCD, got paths without one")
-    return chosen(first, method), chain([first], rest)
+    return chosen(first, method), (at_wavelength(part, wavelength) for part in chain([first], rest))
 
 
 def _numbers(parts: list[Paths], groups: npt.ArrayLike) -> list[npt.NDArray[np.int64]]:
@@ -212,21 +232,30 @@ def _numbers(parts: list[Paths], groups: npt.ArrayLike) -> list[npt.NDArray[np.i
     return np.split(number.astype(np.int64), ends[:-1])
 
 
+def _axes(paths: Paths) -> tuple[FloatArray, ...] | tuple[None]:
+    """The CCD's columns, rows and normal, where light has a polarisation."""
+    assert paths.ccd is not None
+    return (None,) if paths.field is None else paths.ccd.axes
+
+
 def _sum(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> ComplexArray:
     """The coherent sum over rays."""
     from fringetrace.screens import gather
 
-    total = np.empty((0, 0), dtype=np.complex128)
+    total = np.empty((0, 0, 0), dtype=np.complex128)
     for part in parts:
         assert part.ccd is not None
+        axes = _axes(part)
         if total.size == 0:
-            total = np.zeros(part.ccd.shape, dtype=np.complex128)
+            total = np.zeros((len(axes), *part.ccd.shape), dtype=np.complex128)
         weight = 1.0 if part.area is None else part.area / part.ccd.pitch**2
-        gather(
-            part.fate, part.origin, part.length, part.amplitude, part.reflections, half_wave_loss,
-            screen(part.ccd), part.ccd.pitch, weight, wavelength, total,
-        )  # fmt: skip
-    return total
+        for image, axis in zip(total, axes, strict=True):
+            amplitude = part.amplitude if axis is None else along(part, axis).amplitude
+            gather(
+                part.fate, part.origin, part.length, amplitude, part.reflections, half_wave_loss,
+                screen(part.ccd), part.ccd.pitch, weight, wavelength, image,
+            )  # fmt: skip
+    return total if len(total) == 3 else total[0]
 
 
 def _wavefront(
@@ -237,18 +266,32 @@ def _wavefront(
     half_wave_loss: bool,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Mean fields of groups, and means of their products, of all beams together."""
-    from fringetrace import wavefront
-
     parts = list(parts)
     if groups is None:
         groups = np.zeros(sum(len(part) for part in parts), dtype=np.int64)
+    numbers = _numbers(parts, groups)
+    seen = [_component(parts, numbers, axis, wavelength, carrier, half_wave_loss) for axis in _axes(parts[0])]
+    if len(seen) == 1:
+        return seen[0]
+    return np.stack([mean for mean, _ in seen], axis=1), np.sum([mutual for _, mutual in seen], axis=0)
+
+
+def _component(
+    parts: list[Paths],
+    numbers: list[npt.NDArray[np.int64]],
+    axis: FloatArray | None,
+    wavelength: float,
+    carrier: bool,
+    half_wave_loss: bool,
+) -> tuple[ComplexArray, ComplexArray]:
+    """`_wavefront` of a component of the field."""
+    from fringetrace import wavefront
+
     lights, count = [], 1
-    for _, chunks in groupby(
-        zip(parts, _numbers(parts, groups), strict=True), lambda part: id(part[0].source)
-    ):
-        some, numbers = zip(*chunks, strict=True)
-        number = np.concatenate(numbers)
+    for _, chunks in groupby(zip(parts, numbers, strict=True), lambda part: id(part[0].source)):
+        some, its = zip(*chunks, strict=True)
+        number = np.concatenate(its)
         count = max(count, int(number.max(initial=0)) + 1)
-        lights.append(wavefront.light(join(some), number, half_wave_loss))
+        lights.append(wavefront.light(join(some), number, half_wave_loss, axis))
     assert parts[0].ccd is not None
     return wavefront.fields(lights, count, parts[0].ccd.shape, wavelength, carrier)

@@ -31,7 +31,7 @@ class FringetraceWarning(UserWarning):
 
 
 def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
-    """What there is to warn of: aliased fringes, and for the ray sum starved pixels and folded sheets.
+    """What there is to warn of: contradicting media, aliased fringes; for ray sums starved pixels and folds.
 
     Parameters
     ----------
@@ -50,8 +50,9 @@ def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
 
     seen = paths.detected
     if len(seen) == 0:
-        return []
-    texts = [aliased(seen, wavelength)]
+        text = contradicted(paths)
+        return [] if text is None else [text]
+    texts = [contradicted(paths), aliased(seen, wavelength)]
     if chosen(paths, method) == "rays":
         texts += [starved(seen), folded(seen)]
     return [text for text in texts if text is not None]
@@ -85,6 +86,29 @@ def check_budget(budget: Budget) -> None:
         warnings.warn(text, FringetraceWarning, stacklevel=3)
 
 
+def contradicted(paths: Paths) -> str | None:
+    """Whether rays came to a boundary in another medium than it has on that side.
+
+    Parameters
+    ----------
+    paths : Paths
+
+    Returns
+    -------
+    str or None
+    """
+    if paths.contradictions is None or not paths.contradictions.any():
+        return None
+    worst = int(np.argmax(paths.contradictions))
+    surface, number = paths.scene.surfaces[worst], int(paths.contradictions[worst])
+    sides = " and ".join((side or paths.scene.around).name for side in (surface.front, surface.back))
+    return (
+        f"media contradict: {number:,} rays came to {surface.name!r}, between {sides} (front and back), in "
+        f"another medium; close its mesh, turn its normals to the front, name the media of what lies "
+        f"before it, or take the bodies apart where they overlap"
+    )
+
+
 def aliased(paths: Paths, wavelength: float) -> str | None:
     """Whether fringes are too fine for the pixels: the phase between two waves steps by over pi a pixel.
 
@@ -115,7 +139,7 @@ def aliased(paths: Paths, wavelength: float) -> str | None:
     u, v, _ = ccd.axes
     step = np.zeros(rows * columns)
     for axis in (u, v):
-        mean = np.bincount(member.ravel(), paths.direction @ axis) / count
+        mean = np.bincount(member.ravel(), paths.gradient @ axis) / count
         low, high = np.full(len(step), np.inf), np.full(len(step), -np.inf)
         np.minimum.at(low, group // len(kinds), mean)
         np.maximum.at(high, group // len(kinds), mean)

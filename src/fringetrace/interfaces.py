@@ -6,11 +6,14 @@ import cmath
 import math
 from dataclasses import dataclass
 from numbers import Complex, Real
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from fringetrace.waves import FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.films import Film
 
 # A passive surface may not send on more power than it got; rounding is allowed for.
 PASSIVE = 1.0 + 1e-12
@@ -118,6 +121,69 @@ class BeamSplitter:
             )
 
 
+FOLLOWED = ("both", "reflected", "transmitted")
+
+
+def _checked_film(film: Film | None, what: str) -> None:
+    if film is None:
+        return
+    from fringetrace.films import Film
+
+    if not isinstance(film, Film):
+        raise TypeError(f"{what} film: expected None or a Film, got {film!r}")
+
+
+@dataclass(frozen=True)
+class Dielectric:
+    """Boundary between the media in front of a surface and behind it: refraction after Snell and Fresnel.
+
+    A beam without polarisation takes the amplitudes of s light (E along the boundary).
+
+    Parameters
+    ----------
+    follow : {"both", "reflected", "transmitted"}
+        Which branches are traced on; the power of the other counts as truncated.
+    film : Film, optional
+        Thin layers on the boundary, from the front to the back.
+
+    Raises
+    ------
+    ValueError
+        For any other `follow`.
+    TypeError
+        If `film` is no Film.
+    """
+
+    follow: str = "both"
+    film: Film | None = None
+
+    def __post_init__(self) -> None:
+        if self.follow not in FOLLOWED:
+            raise ValueError(f"Dielectric follow: expected one of {FOLLOWED}, got {self.follow!r}")
+        _checked_film(self.film, "Dielectric")
+
+
+@dataclass(frozen=True)
+class Metal:
+    """Boundary with a medium that swallows what gets into it: only the reflected branch is traced.
+
+    Parameters
+    ----------
+    film : Film, optional
+        Thin layers on the metal, from the front to the back.
+
+    Raises
+    ------
+    TypeError
+        If `film` is no Film.
+    """
+
+    film: Film | None = None
+
+    def __post_init__(self) -> None:
+        _checked_film(self.film, "Metal")
+
+
 def reflect(direction: FloatArray, normal: FloatArray) -> FloatArray:
     """Directions after reflection, d - 2 (n.d) n.
 
@@ -133,3 +199,28 @@ def reflect(direction: FloatArray, normal: FloatArray) -> FloatArray:
     """
     along = np.einsum("ij,ij->i", direction, normal)
     return np.asarray(direction - 2.0 * along[:, None] * normal, dtype=np.float64)
+
+
+def refracted(direction: FloatArray, normal: FloatArray, before: float, behind: float) -> FloatArray:
+    """Direction after refraction, by Snell's law: what runs along the surface stays the same.
+
+    Parameters
+    ----------
+    direction : (3,) float64, unit
+    normal : (3,) float64, unit
+        Either side.
+    before, behind : float
+        Real refractive indices.
+
+    Returns
+    -------
+    (3,) float64, unit
+        The same array where the indices are the same; NaN where light is totally reflected.
+    """
+    if before == behind:
+        return direction
+    facing = float(direction @ normal)
+    with np.errstate(invalid="ignore"):
+        deep = np.sqrt((behind - before) * (behind + before) + (before * facing) ** 2)
+    bent = before * direction + (math.copysign(1.0, facing) * deep - before * facing) * normal
+    return np.asarray(bent / behind, dtype=np.float64)

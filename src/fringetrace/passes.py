@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fringetrace.paths import Fate
-from fringetrace.rays import Batch, Ends, Rays, blank, grown, launch, part, start
+from fringetrace.rays import Batch, Carried, Ends, Rays, blank, grown, launch, part, start
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 if TYPE_CHECKING:
     from fringetrace.engine import Engine, Hits
+    from fringetrace.media import Optics
     from fringetrace.refine import Formed
 
 
@@ -22,7 +23,8 @@ class Plan:
     """All that a chunk needs to know, the same for every thread.
 
     `plain`: all surfaces reflect with -1, so that amplitudes follow from the number of bounces.
-    `splits`: some surface sends light both ways, so that a ray may have many ends.
+    `splits`: some surface sends light both ways, so that a ray may have many ends. `matter` is None where
+    light meets nothing but constant amplitudes in a vacuum.
     """
 
     scene: Scene
@@ -39,6 +41,7 @@ class Plan:
     record: bool
     plain: bool
     splits: bool
+    matter: Optics | None = None
 
     @property
     def total(self) -> int:
@@ -59,10 +62,14 @@ class Record:
         self.points = [start.copy()]
         self.triangles: list[Array] = []
 
-    def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
-        """Append a pass: paths born in it inherit, those named by `serials` met a triangle."""
+    def born(self, parents: Array) -> None:
+        """Paths that part from others in the pass that was added last."""
         self.points = [np.concatenate([column, column[parents]]) for column in self.points]
         self.triangles = [np.concatenate([column, column[parents]]) for column in self.triangles]
+
+    def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
+        """Append a pass: paths born in it inherit, those named by `serials` met a triangle."""
+        self.born(parents)
         total = len(self.points[0])
         met, where = np.full(total, -1, dtype=np.int64), np.full((total, 3), np.nan)
         met[serials], where[serials] = triangle, point
@@ -80,6 +87,8 @@ class Chunk:
     segments: int
     doubtful: int
     record: Record | None
+    matter: Carried | None = None
+    contradictions: Array | None = None
 
 
 @dataclass(eq=False)
@@ -89,14 +98,20 @@ class Workspace:
     state: Batch
     hits: Hits
     ends: Ends
+    carried: Carried | None = None
+    brought: Carried | None = None
 
     @staticmethod
-    def blank(rows: int, branches: int) -> Workspace:
-        """Room for so many rays, each of which may split into some branches."""
+    def blank(plan: Plan, rows: int) -> Workspace:
+        """Room for so many rays, and for some branches of each where they split."""
         from fringetrace.engine import Hits
 
-        room = rows * branches
-        return Workspace(blank(Batch, room), Hits.blank(room), blank(Ends, room))
+        room = rows * (4 if plan.splits else 1)
+        space = Workspace(blank(Batch, room), Hits.blank(room), blank(Ends, room))
+        if (matter := plan.matter) is not None:
+            shape = len(matter.media), matter.polarised, matter.fading
+            space.carried, space.brought = Carried.blank(room, *shape), Carried.blank(room, *shape)
+        return space
 
 
 def _noted(record: Record, plan: Plan, before: dict[str, Array], ends: Ends, old: int, hits: Hits) -> None:
@@ -112,6 +127,32 @@ def _noted(record: Record, plan: Plan, before: dict[str, Array], ends: Ends, old
     serials = np.concatenate([before["serial"][met], np.arange(first, first + len(parents))])
     rows = np.concatenate([np.flatnonzero(met), parents])
     record.add(before["serial"][parents], serials, hits.triangle[rows], hits.met[rows, 1:4])
+
+
+def nearest(plan: Plan, space: Workspace, count: int, passed: frozenset[int]) -> int:
+    """Nearest hits of the rays of a workspace, see `engine.find`; on the form where there is one.
+
+    Parameters
+    ----------
+    plan : Plan
+    space : Workspace
+    count : int
+        How many rays it holds.
+    passed : set of surface numbers
+        Surfaces to be passed over.
+
+    Returns
+    -------
+    int
+        How many rays were decided exactly.
+    """
+    if plan.forms:
+        from fringetrace import refine
+
+        return refine.find(plan.engine, plan.forms, space.state, count, space.hits, passed)
+    from fringetrace import engine
+
+    return engine.find(plan.engine, space.state, count, space.hits, passed)
 
 
 def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
@@ -131,7 +172,7 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
     Chunk
     """
     from fringetrace.bounces import interact
-    from fringetrace.engine import Hits, Limits, aim, find, follow
+    from fringetrace.engine import Hits, Limits, aim, follow
 
     rays = plan.rays(first, stop)
     if len(space.state.ray) < len(rays):
@@ -157,12 +198,7 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
             space.ends = ends = grown(ends, 2 * (ended + 2 * count))
         state, hits = space.state, space.hits
         segments += count
-        if plan.forms:
-            from fringetrace.refine import find as find_exact
-
-            doubtful += find_exact(plan.engine, plan.forms, state, count, hits, passed)
-        else:
-            doubtful += find(plan.engine, state, count, hits, passed)
+        doubtful += nearest(plan, space, count, passed)
         passed = frozenset()
         before: dict[str, Array] = {}
         if record is not None:

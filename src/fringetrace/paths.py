@@ -30,7 +30,8 @@ class Fate(IntEnum):
 class Ledger:
     """Where the power went, in units of |amplitude|^2 * m^2 (or of rays, where they have no area).
 
-    `truncated` is what was cut off by the number of bounces or by the least amplitude.
+    `truncated` is what was cut off by the number of bounces or by the least amplitude, and branches
+    that were not to be followed.
     """
 
     incident: float
@@ -89,6 +90,23 @@ class Paths:
         Surface and its triangle at each bounce, padded with -1.
     points : (m, b + 2, 3) float64, metres, or None unless recorded
         Start, hits, and the end on the CCD, padded with NaN.
+    wavelength : float or None, metres
+        That of the trace, where the scene has media; None: any.
+    medium : (m,) int32
+        Number of the medium where the path ended, see `media.materials`. This and what follows is None
+        where light meets nothing but constant amplitudes in a vacuum.
+    index : (m,) float64
+        Real refractive index there.
+    lengths : (m, media) float64, metres
+        Way in each medium.
+    field : (m, 3) complex128, or None where light has no polarisation
+        The field as a vector; `amplitude` is then its size.
+    dropped : (m,) float64
+        Power of branches that were not followed, relative to unit amplitude.
+    bend : (m,) float64
+        Largest sin^2 of incidence at a boundary of media; 2 behind elements that depend on the wavelength.
+    contradictions : (surfaces,) int64
+        How often rays came to a boundary in another medium than it has on that side.
     scene, source, ccd
         What was traced.
     """
@@ -113,6 +131,14 @@ class Paths:
     surface: npt.NDArray[np.int64] | None = None
     triangle: npt.NDArray[np.int64] | None = None
     points: FloatArray | None = None
+    wavelength: float | None = None
+    medium: npt.NDArray[np.int32] | None = None
+    index: FloatArray | None = None
+    lengths: FloatArray | None = None
+    field: ComplexArray | None = None
+    dropped: FloatArray | None = None
+    bend: FloatArray | None = None
+    contradictions: npt.NDArray[np.int64] | None = None
 
     def __len__(self) -> int:
         return len(self.ray)
@@ -154,6 +180,11 @@ class Paths:
         pixel.setflags(write=False)  # kept
         return pixel
 
+    @property
+    def gradient(self) -> FloatArray:
+        """(m, 3) float64: gradient of the optical path where each path ended, index times direction."""
+        return self.direction if self.index is None else self.index[:, None] * self.direction
+
     def sequence(self, row: int) -> list[tuple[int, bool]]:
         """Surfaces that a path met and whether it went through them (decoded from its key).
 
@@ -174,7 +205,7 @@ class Paths:
         """
         row = self._row(row, "sequence")
         digits = self._digits(self.key[row : row + 1], self.bounces[row : row + 1])[0]
-        return [((int(d) - 1) // 2, d % 2 == 0) for d in digits]
+        return [self.scene.digits[int(d) - 1] for d in digits]
 
     def visits(self, surface: int) -> npt.NDArray[np.int64]:
         """How often each path met a surface.
@@ -201,7 +232,8 @@ class Paths:
         bounces = np.zeros(len(kinds), dtype=np.int64)
         bounces[which] = self.bounces
         digits = self._digits(kinds, bounces)
-        return np.asarray(((digits - 1) // 2 == surface).sum(axis=1)[which], dtype=np.int64)
+        mine = [number for number, (there, _) in enumerate(self.scene.digits, start=1) if there == surface]
+        return np.asarray(np.isin(digits, mine).sum(axis=1)[which], dtype=np.int64)
 
     def _row(self, row: int, what: str) -> int:
         """A row counted from the start; a negative one is counted from the end."""
@@ -211,7 +243,7 @@ class Paths:
 
     def _digits(self, keys: Array, bounces: Array) -> Array:
         """Digits of keys, one for each bounce, padded with -1."""
-        base = 2 * len(self.scene.surfaces) + 1
+        base = len(self.scene.digits) + 1
         most, depth = int(64 / np.log2(base)), int(bounces.max(initial=0))
         if depth > most:
             raise ValueError(
@@ -260,18 +292,19 @@ class Paths:
         unit = 1.0 if self.area is None else self.area
         power = np.abs(self.amplitude) ** 2
         by_fate = np.bincount(self.fate, weights=power, minlength=len(Fate)) * unit
+        dropped = 0.0 if self.dropped is None else float(self.dropped.sum()) * unit
         return Ledger(
             incident=self.incident * unit,
             detected=float(by_fate[Fate.DETECTED]),
             left=float(by_fate[Fate.LEFT]),
             absorbed=float(self.lost.sum() * unit),
-            truncated=float(by_fate[Fate.TRUNCATED] + by_fate[Fate.FAINT]),
+            truncated=float(by_fate[Fate.TRUNCATED] + by_fate[Fate.FAINT]) + dropped,
         )
 
 
 COLUMNS = (
     "ray", "fate", "bounces", "reflections", "length", "origin", "direction", "amplitude", "lost", "key",
-    "surface", "triangle", "points",
+    "surface", "triangle", "points", "medium", "index", "lengths", "field", "dropped", "bend",
 )  # fmt: skip
 
 
@@ -312,6 +345,23 @@ def screen(ccd: CCD) -> tuple[float, ...]:
     return tuple(float(number) for number in numbers)
 
 
+def along(paths: Paths, axis: FloatArray) -> Paths:
+    """Paths whose amplitude is the field along an axis.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of light with a polarisation.
+    axis : (3,) float64, unit
+
+    Returns
+    -------
+    Paths
+    """
+    assert paths.field is not None
+    return replace(paths, amplitude=paths.field @ axis)
+
+
 def project(paths: Paths, ccd: CCD) -> Paths:
     """Let the light that left a scene fall on a CCD beyond it, without a new trace.
 
@@ -348,7 +398,9 @@ def project(paths: Paths, ccd: CCD) -> Paths:
     return replace(
         paths,
         fate=np.where(seen, np.int8(Fate.DETECTED), paths.fate),
-        length=np.where(seen, paths.length + reach, paths.length),
+        length=np.where(
+            seen, paths.length + reach * (1.0 if paths.index is None else paths.index), paths.length
+        ),
         origin=np.where(seen[:, None], point, paths.origin),
         ccd=ccd,
     )
@@ -364,6 +416,11 @@ def _padded(columns: Sequence[Array], width: int) -> Array:
         table[row : row + len(column), : column.shape[1]] = column
         row += len(column)
     return table
+
+
+def _summed(counts: Sequence[npt.NDArray[np.int64] | None]) -> npt.NDArray[np.int64] | None:
+    known = [count for count in counts if count is not None]
+    return np.sum(known, axis=0) if known else None
 
 
 def join(parts: Sequence[Paths]) -> Paths:
@@ -396,10 +453,12 @@ def join(parts: Sequence[Paths]) -> Paths:
             columns[name] = _padded(arrays, max(array.shape[1] for array in arrays))
         else:
             columns[name] = np.concatenate(arrays)
+    first = parts[0]
     return replace(
-        parts[0],
+        first,
         **columns,
         incident=sum(part.incident for part in parts),
         segments=sum(part.segments for part in parts),
         doubtful=sum(part.doubtful for part in parts),
+        contradictions=_summed([part.contradictions for part in parts]),
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.paths import Paths
+from fringetrace.paths import Paths, along
 from fringetrace.rays import launch_at
 from fringetrace.scene import CCD, Beam, Scene, Surface
 from fringetrace.sheets import landed
@@ -29,7 +29,8 @@ class Probe:
 
     `parts` are those of `parted`; `keys` the sequences that are looked at, of up to so many `bounces`;
     light fainter than `faintest` is not followed.
-    Without `half_wave_loss` a reflection off a mirror changes no sign.
+    Without `half_wave_loss` a reflection off a mirror changes no sign. Media are those at the `wavelength`;
+    of light with a polarisation the amplitude is the field along an `axis` (3,).
     """
 
     scene: Scene
@@ -40,6 +41,8 @@ class Probe:
     bounces: int
     faintest: float
     half_wave_loss: bool
+    wavelength: float | None = None
+    axis: FloatArray | None = None
 
     @property
     def fuzz(self) -> FloatArray:
@@ -71,8 +74,11 @@ class Probe:
         inside = np.clip(at, RIM, np.array(self.beam.shape[::-1]) - RIM)
         rays = launch_at(self.beam, inside[:, 0], inside[:, 1])
         paths = trace(
-            self.scene, rays, self.ccd, max_bounces=self.bounces, min_amplitude=self.faintest, record=True
-        )
+            self.scene, rays, self.ccd, wavelength=self.wavelength, max_bounces=self.bounces,
+            min_amplitude=self.faintest, record=True,
+        )  # fmt: skip
+        if self.axis is not None:
+            paths = along(paths, self.axis)
         if not self.half_wave_loss:
             sign = 1.0 - 2.0 * (paths.reflections % 2)
             paths = replace(paths, amplitude=paths.amplitude * sign)

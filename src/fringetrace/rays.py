@@ -13,6 +13,9 @@ from fringetrace.scene import Beam, as_names
 from fringetrace.vectors import component, unit
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
+# A field may point along its ray by as much: rounding.
+TRANSVERSE = 1e-9
+
 
 def _rows_of_three(value: npt.ArrayLike, what: str) -> FloatArray:
     try:
@@ -46,11 +49,13 @@ class Rays:
     area : float, m^2, optional
         Beam cross-section that one ray stands for. None: rays are just counted.
     passes : names of surfaces that the rays pass over on their first leg.
+    polarisation : (n, 3) complex128, or (3,), optional
+        The field's direction, across the ray; scaled to unit length. None: rays carry one number.
 
     Raises
     ------
     ValueError
-        For shapes that differ, numbers that are not finite, directions of length 0.
+        For shapes that differ, numbers that are not finite, directions of length 0, fields along a ray.
     """
 
     origin: FloatArray
@@ -59,6 +64,7 @@ class Rays:
     amplitude: ComplexArray | None = None
     area: float | None = None
     passes: tuple[str, ...] = ()
+    polarisation: ComplexArray | None = None
 
     def __post_init__(self) -> None:
         origin = _rows_of_three(self.origin, "Rays origin")
@@ -78,6 +84,27 @@ class Rays:
         area = self.area
         if area is not None and not (isinstance(area, Real) and np.isfinite(area) and area > 0.0):
             raise ValueError(f"Rays area: expected a positive area in m^2, got {self.area!r}")
+        if self.polarisation is not None:
+            object.__setattr__(self, "polarisation", self._transverse(self.polarisation))
+
+    def _transverse(self, value: npt.ArrayLike) -> ComplexArray:
+        """A unit field across each ray."""
+        what = "Rays polarisation"
+        try:
+            fields = np.broadcast_to(np.asarray(value, dtype=np.complex128), (len(self), 3))
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{what}: expected numbers of shape ({len(self)}, 3), got {error}") from error
+        size = np.linalg.norm(fields, axis=1, keepdims=True)
+        if not (np.isfinite(size) & (size > 0.0)).all():
+            raise ValueError(f"{what}: expected finite fields other than 0, got others")
+        fields = fields / size
+        along = np.einsum("ij,ij->i", fields, self.direction)
+        if (np.abs(along) > TRANSVERSE).any():
+            ray = int(np.argmax(np.abs(along)))
+            raise ValueError(
+                f"{what}: expected fields across the rays, got {abs(along[ray]):.3g} along ray {ray}"
+            )
+        return np.asarray(fields - along[:, None] * self.direction, dtype=np.complex128)
 
     def _column(self, value: npt.ArrayLike | None, default: float, dtype: type, what: str) -> Array:
         if value is None:
@@ -110,7 +137,8 @@ class Rays:
         columns = {
             name: getattr(self, name)[start:stop] for name in ("origin", "direction", "length", "amplitude")
         }
-        return _trusted(**columns, area=self.area, passes=self.passes)
+        field = None if self.polarisation is None else self.polarisation[start:stop]
+        return _trusted(**columns, area=self.area, passes=self.passes, polarisation=field)
 
 
 def _trusted(**fields: object) -> Rays:
@@ -119,6 +147,14 @@ def _trusted(**fields: object) -> Rays:
     for name, value in fields.items():
         object.__setattr__(rays, name, value)
     return rays
+
+
+def _field(beam: Beam, count: int) -> ComplexArray | None:
+    """The field of a beam, the same for all rays."""
+    if beam.polarisation is None:
+        return None
+    u, v, _ = beam.axes
+    return np.broadcast_to(beam.polarisation[0] * u + beam.polarisation[1] * v, (count, 3))
 
 
 def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
@@ -165,6 +201,7 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
         amplitude=amplitude,
         area=beam.area,
         passes=beam.passes,
+        polarisation=_field(beam, count),
     )
 
 
@@ -194,6 +231,7 @@ def launch_at(beam: Beam, column: FloatArray, row: FloatArray) -> Rays:
         amplitude=np.ones(len(origin), dtype=np.complex128),
         area=beam.area,
         passes=beam.passes,
+        polarisation=_field(beam, len(origin)),
     )
 
 
@@ -240,6 +278,65 @@ class Ends(Tracks):
     direction: FloatArray
     length: FloatArray
     fate: npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True, eq=False)
+class Carried:
+    """What rays carry through matter, beside a batch or its ends, row by row.
+
+    Attributes
+    ----------
+    medium : (n,) int32
+        Number of the medium that the ray is in, see `media.Optics`.
+    index : (n,) float64
+        Its real index for the ray: |Re k| / k0.
+    fade : (n, 3) float64, or (0, 3) where no medium absorbs
+        Im k / k0.
+    lengths : (n, media) float64, metres
+        Way in each medium.
+    field : (n, 3) complex128, or (0, 3) where light is scalar
+    dropped : (n,) float64
+        Power of branches that were not followed.
+    bend : (n,) float64
+        Largest sin^2 of incidence at a boundary of media; 2 behind elements that depend on the wavelength.
+    """
+
+    medium: npt.NDArray[np.int32]
+    index: FloatArray
+    fade: FloatArray
+    lengths: FloatArray
+    field: ComplexArray
+    dropped: FloatArray
+    bend: FloatArray
+
+    @property
+    def columns(self) -> tuple[Array, ...]:
+        """All columns, as the kernels take them."""
+        return tuple(vars(self).values())
+
+    @staticmethod
+    def blank(rows: int, media: int, polarised: bool, fading: bool) -> Carried:
+        """Room for so many rows, not filled in."""
+        return Carried(
+            medium=np.empty(rows, dtype=np.int32),
+            index=np.empty(rows),
+            fade=np.empty((rows if fading else 0, 3)),
+            lengths=np.empty((rows, media)),
+            field=np.empty((rows if polarised else 0, 3), dtype=np.complex128),
+            dropped=np.empty(rows),
+            bend=np.empty(rows),
+        )
+
+    def rows(self, which: Array | slice) -> Carried:
+        """Some rows."""
+        return Carried(*(column[which] if len(column) else column for column in vars(self).values()))
+
+    def grown(self, rows: int) -> Carried:
+        """The same rows in arrays with room for more."""
+        larger = Carried.blank(rows, self.lengths.shape[1], len(self.field) > 0, len(self.fade) > 0)
+        for column, wider in zip(self.columns, larger.columns, strict=True):
+            wider[: len(column)] = column
+        return larger
 
 
 Table = TypeVar("Table", Batch, Ends)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.contacts import indices
+from fringetrace.interfaces import refracted
 from fringetrace.outlines import cut
 from fringetrace.paths import Paths
 from fringetrace.probes import RIM, profile
@@ -67,7 +69,7 @@ class Region:
 
 
 def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
-    """The plane wave that a ray belongs to: what its reflections make of a step across the beam."""
+    """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.surface is not None
     assert paths.triangle is not None
     assert paths.points is not None
@@ -76,9 +78,10 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     direction = n
     bounces = int(paths.bounces[row])
     points = paths.points[row]
+    index = indices(paths.where(np.array([row])))[0]
     for bounce in range(bounces):
-        mesh = paths.scene.surfaces[paths.surface[row, bounce]].mesh
-        a, b, c = mesh.vertices[mesh.faces[paths.triangle[row, bounce]]]
+        surface = paths.scene.surfaces[paths.surface[row, bounce]]
+        a, b, c = surface.mesh.vertices[surface.mesh.faces[paths.triangle[row, bounce]]]
         normal = np.cross(b - a, c - a)
         normal /= np.linalg.norm(normal)
         onward = paths.direction[row]
@@ -86,9 +89,17 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
             onward = points[bounce + 2] - points[bounce + 1]
             onward = onward / np.linalg.norm(onward)
         turned = direction - 2.0 * (direction @ normal) * normal
-        if np.linalg.norm(onward - turned) < np.linalg.norm(onward - direction):
-            direction = turned
+        bent = refracted(direction, normal, index[bounce], index[bounce + 1])
+        if hasattr(surface.interface, "act"):
+            bent = onward
+        # NaN where light is totally reflected
+        if not np.linalg.norm(onward - bent) <= np.linalg.norm(onward - turned):
             across = across - 2.0 * np.outer(normal, normal @ across)
+            direction = turned
+        elif bent is not direction:
+            # the step along the surface is the same on both sides
+            across = across - np.outer(direction, (normal @ across) / (normal @ direction))
+            direction = bent
     right, up, facing = frame(ccd.normal, ccd.up, "CCD")
     # along the rays into the plane of focus
     across = across - np.outer(direction, (facing @ across) / (facing @ direction))
@@ -103,7 +114,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
         matrix=matrix,
         start=start,
         path=float(length[0]),
-        gradient=np.array([direction @ right, direction @ up]) * ccd.pitch,
+        gradient=index[-1] * np.array([direction @ right, direction @ up]) * ccd.pitch,
         amplitude=complex(paths.amplitude[row]) * size,
     )
 

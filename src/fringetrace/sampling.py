@@ -143,7 +143,7 @@ def spread(paths: Paths, wavelength: float) -> Paths:
     part, (u, v, _) = paths.ccd.pitch / parts, paths.ccd.axes
     at = paths.pixel * parts
     shift = (np.floor(at) + 0.5 - at) * part
-    slope = np.stack([paths.direction @ v, paths.direction @ u], axis=1)
+    slope = np.stack([paths.gradient @ v, paths.gradient @ u], axis=1)
     mean = np.sinc(slope * (part / wavelength)).prod(axis=1)
     return replace(paths, length=paths.length + (shift * slope).sum(axis=1), amplitude=paths.amplitude * mean)
 

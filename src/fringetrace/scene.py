@@ -3,20 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from numbers import Real
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.interfaces import Interface
+from fringetrace.interfaces import Dielectric, Interface, Metal
 from fringetrace.mesh import Mesh, as_mesh
 from fringetrace.vectors import checked_direction, checked_vector, frame
-from fringetrace.waves import FloatArray
+from fringetrace.waves import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
+    from fringetrace.elements import Element
     from fringetrace.forms import Form
+    from fringetrace.indices import Material
+
+
+def _medium(value: Any, what: str) -> Material | None:
+    if value is None:
+        return None
+    from fringetrace.materials import as_material
+
+    return as_material(value, what)
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,38 +36,60 @@ class Surface:
     Parameters
     ----------
     mesh : Mesh, trimesh.Trimesh, or alike, metres
-    interface : Interface
-        `Mirror`, `Absorber`, `BeamSplitter`.
+    interface : Interface, Dielectric, Metal, or one of `fringetrace.elements`
+        `Mirror`, `Absorber`, `BeamSplitter`; `Dielectric`, `Metal`; thin optical elements.
     name : str
     form : Form, optional
         The exact surface that the facets stand for, one of `fringetrace.forms`; None: the facets
         are the surface.
+    front, back : Material, or number, or name of a material, optional
+        The media of a `Dielectric` or `Metal`, on the side that the mesh's normals point to and on the
+        other; None: that of the scene.
 
     Raises
     ------
     TypeError
-        If `mesh` is no mesh, `interface` no interface, `form` no form.
+        If `mesh` is no mesh, `interface` no interface, `form` no form, a medium no material.
     ValueError
-        If the mesh does not lie along the form.
+        If the mesh does not lie along the form, or media are missing or not asked for.
     """
 
     mesh: Mesh
-    interface: Interface
+    interface: Interface | Dielectric | Metal | Element
     name: str = "surface"
     form: Form | None = None
+    front: Material | None = None
+    back: Material | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", as_mesh(self.mesh, self.name))
-        branches = all(hasattr(self.interface, name) for name in ("reflection", "transmission"))
-        if isinstance(self.interface, type) or not branches:
+        constant = all(hasattr(self.interface, name) for name in ("reflection", "transmission"))
+        known = constant or isinstance(self.interface, (Dielectric, Metal)) or hasattr(self.interface, "act")
+        if isinstance(self.interface, type) or not known:
             raise TypeError(f"{self.name} interface: expected one such as Mirror(), got {self.interface!r}")
+        self._check_media()
         if self.form is not None:
             if isinstance(self.form, type) or not hasattr(self.form, "fit"):
                 raise TypeError(f"{self.name} form: expected one such as forms.Sphere, got {self.form!r}")
             self.form.fit(self.mesh.vertices, self.mesh.faces)  # refuses what is not meant for this mesh
 
+    @property
+    def boundary(self) -> bool:
+        """Whether it parts two media."""
+        return isinstance(self.interface, (Dielectric, Metal))
+
+    def _check_media(self) -> None:
+        for side in ("front", "back"):
+            object.__setattr__(self, side, _medium(getattr(self, side), f"{self.name} {side}"))
+        given = [side for side in ("front", "back") if getattr(self, side) is not None]
+        kind = type(self.interface).__name__
+        if given and not self.boundary:
+            raise ValueError(f"{self.name} {given[0]}: expected no medium beside a {kind}, got one")
+        if self.boundary and not given:
+            raise ValueError(f"{self.name}: expected a medium in front of a {kind} or behind it, got none")
+
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Surface:
-        """The surface, mesh and form, turned about the origin, then shifted; as `Mesh.moved`.
+        """The surface, mesh, interface and form, turned about the origin, then shifted; as `Mesh.moved`.
 
         Parameters
         ----------
@@ -69,7 +101,10 @@ class Surface:
         Surface
         """
         form = None if self.form is None else self.form.moved(offset, turn)
-        return Surface(self.mesh.moved(offset, turn), self.interface, self.name, form)
+        interface = self.interface
+        if hasattr(interface, "moved"):
+            interface = interface.moved(offset, turn)
+        return replace(self, mesh=self.mesh.moved(offset, turn), interface=interface, form=form)
 
 
 @dataclass(frozen=True)
@@ -135,6 +170,17 @@ def _checked_grid(shape: Any, what: str) -> tuple[int, int]:
     return int(grid[0]), int(grid[1])
 
 
+def _checked_jones(value: Any) -> ComplexArray:
+    try:
+        vector = np.array(value, dtype=np.complex128)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
+    size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
+    if not (np.isfinite(size) and size > 0.0):
+        raise ValueError(f"Beam polarisation: expected a Jones vector of two numbers, got {value!r}")
+    return vector / size
+
+
 @dataclass(frozen=True, eq=False)
 class Beam:
     """A collimated coherent beam: a plane wave, launched as a grid of parallel rays.
@@ -152,11 +198,15 @@ class Beam:
     profile : callable, optional
         Amplitude at beam coordinates (x, y) in metres; None is uniform, 1 everywhere.
     passes : names of surfaces that the rays pass over on their first leg.
+    polarisation : (2,) complex, optional
+        Jones vector along columns and rows, scaled to unit length; the field is then traced as a
+        vector. None: as one number.
 
     Raises
     ------
     ValueError
-        For a direction of length 0, an `up` along it, sizes or shapes that are not positive.
+        For a direction of length 0, an `up` along it, sizes or shapes that are not positive, a
+        polarisation that is none.
     TypeError
         If the profile is no function.
     """
@@ -168,6 +218,7 @@ class Beam:
     shape: tuple[int, int]
     profile: Profile | None = None
     passes: tuple[str, ...] = ()
+    polarisation: ComplexArray | None = None
     axes: Axes = field(init=False, repr=False)  # of columns, rows, and the direction
 
     def __post_init__(self) -> None:
@@ -180,6 +231,8 @@ class Beam:
         if self.profile is not None and not callable(self.profile):
             raise TypeError(f"Beam profile: expected None or a function of (x, y), got {self.profile!r}")
         object.__setattr__(self, "passes", as_names(self.passes))
+        if self.polarisation is not None:
+            object.__setattr__(self, "polarisation", _checked_jones(self.polarisation))
 
     @property
     def area(self) -> float:
@@ -245,16 +298,19 @@ class Scene:
     Parameters
     ----------
     surfaces : iterable of Surface
+    medium : Material, or number, or name of a material, optional
+        What is around them, where beams start; None: a vacuum.
 
     Raises
     ------
     TypeError
-        If one of them is not a Surface.
+        If one of them is not a Surface, or the medium no material.
     ValueError
         If there are none.
     """
 
     surfaces: tuple[Surface, ...]
+    medium: Material | None = None
     # what rooms above have derived from the surfaces (the engine's bodies), kept with them
     derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -266,9 +322,33 @@ class Scene:
         if not surfaces:
             raise ValueError("Scene: expected at least one Surface, got none")
         object.__setattr__(self, "surfaces", surfaces)
+        object.__setattr__(self, "medium", _medium(self.medium, "Scene medium"))
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"surfaces": self.surfaces, "derived": {}}
+        return {**vars(self), "derived": {}}
+
+    @property
+    def around(self) -> Material:
+        """The medium around the surfaces."""
+        if self.medium is not None:
+            return self.medium
+        from fringetrace.materials import VACUUM
+
+        return VACUUM
+
+    @property
+    def digits(self) -> tuple[tuple[int, bool], ...]:
+        """Surface and branch (whether transmitted) for which each digit of a path key stands, from 1 on.
+
+        Two for each surface; then one for each further branch of elements with several.
+        """
+        plain = [(number, through) for number in range(len(self.surfaces)) for through in (False, True)]
+        further = [
+            (number, True)
+            for number, surface in enumerate(self.surfaces)
+            for _ in range(getattr(surface.interface, "branches", 1) - 1)
+        ]
+        return (*plain, *further)
 
     def index(self, name: str) -> int:
         """Position of the surface called `name`.

@@ -85,7 +85,8 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
         reach = np.where(beside, reach + ccd.focus / facing, 0.0)
     rows = np.flatnonzero(beside | (paths.fate == Fate.DETECTED))
     point = paths.origin[rows] + reach[rows, None] * paths.direction[rows]
-    return rows, point, paths.length[rows] + reach[rows]
+    index = 1.0 if paths.index is None else paths.index[rows]
+    return rows, point, paths.length[rows] + reach[rows] * index
 
 
 def sheets(paths: Paths) -> Iterator[Sheet]:
@@ -192,8 +193,8 @@ def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
     return Arrivals(
         x=offset @ u / ccd.pitch + 0.5 * ccd.shape[1],
         y=offset @ v / ccd.pitch + 0.5 * ccd.shape[0],
-        slope_x=direction @ u * ccd.pitch,
-        slope_y=direction @ v * ccd.pitch,
+        slope_x=chosen.gradient @ u * ccd.pitch,
+        slope_y=chosen.gradient @ v * ccd.pitch,
         length=length,
         way=way,
         direction=direction,

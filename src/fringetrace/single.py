@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.bodies import Float32, plain
+from fringetrace.bodies import Float32
+from fringetrace.bodies import plain as plain_hits
+from fringetrace.media import constants, plain
 from fringetrace.paths import Fate, Paths
 from fringetrace.rays import launch
 from fringetrace.scene import CCD, Beam, Scene
@@ -58,13 +60,20 @@ def trace(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int = 12) -> Paths:
     Paths
         Those that reach the CCD: float32 numbers in float64 arrays. What fell by the wayside is not
         in it, nor is any key.
+
+    Raises
+    ------
+    ValueError
+        For scenes with media or thin elements, or light with a polarisation.
     """
+    if not plain(scene, beam.polarisation is not None):
+        raise ValueError("single: expected mirrors and beam splitters in a vacuum, got media or elements")
     meshes = [surface.mesh for surface in scene.surfaces]
     shift = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
     faces = np.concatenate([mesh.faces + first for mesh, first in zip(meshes, shift, strict=False)])
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.faces) for mesh in meshes])
-    hits = plain(vertices.astype(np.float32), faces)
+    hits = plain_hits(vertices.astype(np.float32), faces)
     step = np.float32(RESTART * np.ptp(vertices, axis=0).max())
     rays, ends = _launched(beam), []
     incident = float((abs(rays.amplitude) ** 2).sum())
@@ -106,9 +115,7 @@ def _landing(rays: _Rays, path: Float32, ccd: CCD) -> tuple[Float32, Array]:
 
 def _split(rays: _Rays, surface: Array, normal: Float32, scene: Scene) -> _Rays:
     """Both branches of rays that have met surfaces."""
-    interfaces = [surface.interface for surface in scene.surfaces]
-    back = np.array([complex(interface.reflection) for interface in interfaces])[surface]
-    through = np.array([complex(interface.transmission) for interface in interfaces])[surface]
+    back, through = (table[surface] for table in constants(scene))
     unit = normal / np.linalg.norm(normal, axis=1, keepdims=True)
     along = np.einsum("ij,ij->i", rays.direction, unit)
     reflected = replace(

@@ -9,15 +9,15 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from numbers import Real
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from fringetrace.passes import Plan, Record, Workspace, advance, tables
 from fringetrace.paths import Paths, join, screen
-from fringetrace.rays import Ends, Rays, blank, part
+from fringetrace.rays import Carried, Ends, Rays, blank, part
 from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.waves import ComplexArray
+from fringetrace.waves import Array, ComplexArray
 
 if TYPE_CHECKING:
     from fringetrace.engine import Engine
@@ -44,8 +44,9 @@ def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
 
 
 def _plan(
-    scene: Scene, source: Beam | Rays, ccd: CCD | None, max_bounces: int, min_amplitude: float, record: bool
-) -> Plan:
+    scene: Scene, source: Beam | Rays, ccd: CCD | None, wavelength: float | None, max_bounces: int,
+    min_amplitude: float, record: bool,
+) -> Plan:  # fmt: skip
     if not isinstance(scene, Scene):
         raise TypeError(f"trace: expected a Scene, got {type(scene).__name__}")
     if not isinstance(source, (Beam, Rays)):
@@ -56,14 +57,14 @@ def _plan(
     if not (isinstance(min_amplitude, Real) and np.isfinite(min_amplitude) and min_amplitude >= 0.0):
         raise ValueError(f"min_amplitude: expected a number of at least 0, got {min_amplitude!r}")
     from fringetrace.engine import build
+    from fringetrace.media import constants, optics
 
+    matter = optics(scene, wavelength, source.polarisation is not None)
     passed = frozenset(scene.index(name) for name in source.passes)
     engine = build(
         scene, passed | {i for i, surface in enumerate(scene.surfaces) if surface.form is not None}
     )
-    interfaces = [surface.interface for surface in scene.surfaces]
-    reflection = np.array([complex(interface.reflection) for interface in interfaces])
-    transmission = np.array([complex(interface.transmission) for interface in interfaces])
+    reflection, transmission = constants(scene)
     return Plan(
         scene=scene,
         source=source,
@@ -77,14 +78,16 @@ def _plan(
         max_bounces=most,
         faint=float(min_amplitude) ** 2,
         record=record,
-        plain=bool((reflection == -1.0).all() and not transmission.any()),
-        splits=bool((abs(reflection) * abs(transmission)).any()),
+        plain=matter is None and bool((reflection == -1.0).all() and not transmission.any()),
+        splits=matter is not None or bool((abs(reflection) * abs(transmission)).any()),
+        matter=matter,
     )
 
 
 def _paths(
     plan: Plan, ends: Ends, first: int, launched: ComplexArray, segments: int, doubtful: int,
-    record: Record | None = None, whole: bool = False,
+    record: Record | None = None, whole: bool = False, matter: Carried | None = None,
+    contradictions: Array | None = None,
 ) -> Paths:  # fmt: skip
     """The table of what has ended, sorted by ray; `launched` are the amplitudes from ray `first` on.
 
@@ -96,6 +99,7 @@ def _paths(
         # a ray's ends come in an order that does not depend on other rays: a stable sort keeps it
         order = sort(ends.ray, first, len(launched))
         ends = Ends(**{name: column[order] for name, column in vars(ends).items()})
+        matter = None if matter is None else matter.rows(order)
     # a broadcast 1 (no strides) stands for amplitudes that are all 1
     relative = launched[ends.ray - first] if len(ends.ray) > len(launched) else launched
     if plan.plain:
@@ -105,7 +109,10 @@ def _paths(
             amplitude *= relative
     else:
         reflections, lost = ends.reflections, ends.lost * np.abs(relative) ** 2
-        amplitude = relative * ends.amplitude
+        amplitude = (abs(relative) if _polarised(plan) else relative) * ends.amplitude
+    extra: dict[str, Any] = {} if record is None else dict(tables(plan, record, ends))
+    if matter is not None:
+        extra |= _matter(plan, matter, relative)
     return Paths(
         ray=ends.ray,
         fate=ends.fate,
@@ -124,8 +131,27 @@ def _paths(
         scene=plan.scene,
         source=plan.source,
         ccd=plan.ccd,
-        **({} if record is None else tables(plan, record, ends)),
+        contradictions=contradictions,
+        **extra,
     )
+
+
+def _polarised(plan: Plan) -> bool:
+    return plan.matter is not None and plan.matter.polarised
+
+
+def _matter(plan: Plan, matter: Carried, relative: ComplexArray) -> dict[str, Any]:
+    """What paths through matter bring along."""
+    assert plan.matter is not None
+    return {
+        "wavelength": plan.matter.wavelength,
+        "medium": matter.medium,
+        "index": matter.index,
+        "lengths": matter.lengths,
+        "field": matter.field * relative[:, None] if plan.matter.polarised else None,
+        "dropped": matter.dropped * np.abs(relative) ** 2,
+        "bend": matter.bend,
+    }
 
 
 def _chunk(plan: Plan, chunk: int | None) -> int:
@@ -168,7 +194,7 @@ class _Workspaces:
     """One workspace for each thread, handed on from chunk to chunk."""
 
     def __init__(self, plan: Plan, chunk: int) -> None:
-        self.rows, self.branches = min(chunk, plan.total), 4 if plan.splits else 1
+        self.plan, self.rows = plan, min(chunk, plan.total)
         self.idle: SimpleQueue[Workspace] = SimpleQueue()
 
     @contextmanager
@@ -177,7 +203,7 @@ class _Workspaces:
         try:
             space = self.idle.get_nowait()
         except Empty:
-            space = Workspace.blank(self.rows, self.branches)
+            space = Workspace.blank(self.plan, self.rows)
         yield space
         self.idle.put(space)
 
@@ -188,10 +214,18 @@ def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress |
 
     def work(first: int, stop: int) -> Paths:
         with spaces.one() as space:
-            done = advance(plan, space, None, first, stop)
+            if plan.matter is None:
+                done = advance(plan, space, None, first, stop)
+            else:
+                from fringetrace.encounters import traverse
+
+                done = traverse(plan, space, first, stop)
             launched = np.asarray(done.rays.amplitude)
             ends = part(done.ends, 0, done.rows)
-            return _paths(plan, ends, first, launched, done.segments, done.doubtful, done.record)
+            return _paths(
+                plan, ends, first, launched, done.segments, done.doubtful, done.record,
+                matter=done.matter, contradictions=done.contradictions,
+            )  # fmt: skip
 
     return _pooled(work, plan.total, threads, chunk, progress)
 
@@ -222,6 +256,7 @@ def stream(
     source: Beam | Rays,
     ccd: CCD | None = None,
     *,
+    wavelength: float | None = None,
     max_bounces: int = 12,
     min_amplitude: float = 1e-6,
     record: bool = False,
@@ -233,7 +268,7 @@ def stream(
 
     Parameters
     ----------
-    scene, source, ccd, max_bounces, min_amplitude, record, threads, chunk, progress
+    scene, source, ccd, wavelength, max_bounces, min_amplitude, record, threads, chunk, progress
         See `trace`.
 
     Yields
@@ -241,7 +276,7 @@ def stream(
     Paths
         Of consecutive rays, in their order.
     """
-    plan = _plan(scene, source, ccd, max_bounces, min_amplitude, record)
+    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
     workers = None if threads is None else _whole(threads, 1, "threads")
     return _in_chunks(plan, workers, _chunk(plan, chunk), progress)
 
@@ -251,6 +286,7 @@ def trace(
     source: Beam | Rays,
     ccd: CCD | None = None,
     *,
+    wavelength: float | None = None,
     max_bounces: int = 12,
     min_amplitude: float = 1e-6,
     record: bool = False,
@@ -266,6 +302,9 @@ def trace(
     source : Beam or Rays
     ccd : CCD, optional
         None: rays are followed until they leave.
+    wavelength : float, metres, optional
+        Vacuum wavelength, needed where a medium is dispersive or absorbs, behind films, for some
+        elements. Where nothing is bent by it, fields at others need no new trace.
     max_bounces : int
         Surfaces that a path may meet; a path that would meet one more is `TRUNCATED`.
     min_amplitude : float
@@ -289,9 +328,10 @@ def trace(
     TypeError
         If an argument is of the wrong kind.
     ValueError
-        For counts or amplitudes below 0, or names of unknown surfaces in the source's `passes`.
+        For counts or amplitudes below 0, or names of unknown surfaces in the source's `passes`; for a
+        wavelength that is missing, or outside the range of a material.
     """
-    plan = _plan(scene, source, ccd, max_bounces, min_amplitude, record)
+    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
     workers = None if threads is None else _whole(threads, 1, "threads")
     size = _chunk(plan, chunk)
     if not (plan.splits or record):

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace import regions, rims, sheets
-from fringetrace.paths import Paths
+from fringetrace.paths import Paths, along
 from fringetrace.quadrature import Samples, averaged, edges
 from fringetrace.regions import Region, Wave
 from fringetrace.scene import Beam
@@ -43,7 +43,9 @@ class Light:
     segments: FloatArray
 
 
-def light(paths: Paths, groups: Numbers, half_wave_loss: bool = True) -> Light:
+def light(
+    paths: Paths, groups: Numbers, half_wave_loss: bool = True, axis: FloatArray | None = None
+) -> Light:
     """Plane waves and curved sheets of a beam.
 
     Parameters
@@ -54,6 +56,8 @@ def light(paths: Paths, groups: Numbers, half_wave_loss: bool = True) -> Light:
         The group of each path, the same for all of a key.
     half_wave_loss : bool
         False leaves out the factor -1 of each reflection off a mirror.
+    axis : (3,) float64, optional
+        Of light with a polarisation, the component of the field along it.
 
     Returns
     -------
@@ -72,13 +76,15 @@ def light(paths: Paths, groups: Numbers, half_wave_loss: bool = True) -> Light:
         return int(groups[first[np.searchsorted(keys, key)]])
 
     if paths.points is not None and paths.triangle is None:  # arrivals that no facet stands for
+        if axis is not None:
+            paths = along(paths, axis)
         if not half_wave_loss:
             paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
         landed = np.unique(paths.key[sheets.landed(paths, ccd)[0]])
         found = zip(landed, sheets.sheets(paths), strict=True)
         curved = [(group(key), sheets.cells(sheet, ccd)) for key, sheet in found]
         return Light(beam, unit, [], curved, np.empty((0, 4)))
-    surveyed = survey(paths, half_wave_loss)
+    surveyed = survey(paths, half_wave_loss, axis)
     member = {name: group(key) for name, key in zip(surveyed.names, surveyed.keys, strict=True)}
     plane = [(member[wave.name], wave, region) for wave, region in regions.waves(surveyed)]
     cells, rim = rims.curved(surveyed)
