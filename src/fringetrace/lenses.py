@@ -15,8 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.forms import Conic, Cylinder, Form, Sphere
-from fringetrace.interfaces import Absorber, Dielectric, Metal
-from fringetrace.materials import Material, as_material
+from fringetrace.indices import Material
+from fringetrace.interfaces import Absorber, Dielectric, Interface, Metal
+from fringetrace.materials import as_material
 from fringetrace.mesh import Mesh
 from fringetrace.scene import Surface
 from fringetrace.shapes import checked_length, icosphere
@@ -26,6 +27,7 @@ from fringetrace.waves import FloatArray
 
 Glass = Material | complex | str | None
 Z = np.array([0.0, 0.0, 1.0])
+Boundary = Interface | Dielectric | Metal
 Vector = npt.ArrayLike
 
 # A face bends by no more than this from one ring of vertices to the next, radians: facets then stand off
@@ -51,8 +53,8 @@ def lens(
     terms: Sequence[Sequence[float]] | None = None,
     vertex: Vector = (0.0, 0.0, 0.0),
     axis: Vector = (0.0, 0.0, 1.0),
-    interface: Any = Dielectric(),  # noqa: B008 - frozen
-    edge: Any = Absorber(),  # noqa: B008 - frozen
+    interface: Boundary | Sequence[Boundary] = Dielectric(),  # noqa: B008 - frozen
+    edge: Boundary = Absorber(),  # noqa: B008 - frozen
     rings: int | None = None,
     name: str = "lens",
 ) -> tuple[Surface, ...]:
@@ -77,9 +79,9 @@ def lens(
         Of the first face.
     axis : (3,)
         Direction in which light comes.
-    interface : Interface, or one for each face
+    interface : as a `Surface` has it, or one for each face
         Default: bare glass.
-    edge : Interface
+    edge : as a `Surface` has it
         Of the cylinders between the rims; default black.
     rings : int, optional
         Rings of vertices on each face. Default: 16, or so many that no face bends by more than 0.04 rad
@@ -216,7 +218,7 @@ def ball(
     glass: Glass,
     *,
     centre: Vector = (0.0, 0.0, 0.0),
-    interface: Any = Dielectric(),  # noqa: B008 - frozen
+    interface: Boundary = Dielectric(),  # noqa: B008 - frozen
     name: str = "ball",
 ) -> Surface:
     """A ball lens.
@@ -226,7 +228,7 @@ def ball(
     diameter : float, metres
     glass : Material, or index, or name
     centre : (3,) metres
-    interface : Interface
+    interface : as a `Surface` has it
     name : str
 
     Returns
@@ -277,7 +279,7 @@ def focal_lengths(
 
 
 def _surface(
-    mesh: Mesh, interface: Any, name: str, form: Form | None, front: Glass, back: Glass
+    mesh: Mesh, interface: Boundary, name: str, form: Form | None, front: Glass, back: Glass
 ) -> Surface:
     """A surface, with its media where it parts any."""
     if isinstance(interface, (Dielectric, Metal)):
