@@ -14,6 +14,7 @@ from fringetrace.budget import Budget, budget
 from fringetrace.field import chosen, complex_field, mutual_intensity
 from fringetrace.paths import Paths
 from fringetrace.quadrature import mutual_products
+from fringetrace.sampling import centred
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.trace import stream, trace
 from fringetrace.waves import Array, ComplexArray, FloatArray, checked_wavelength, wavenumber
@@ -333,38 +334,6 @@ class Bench:
             raise ValueError("height: expected pixels with light from both arms, got none")
         flat = phase.wrap(measured - self.carrier(wavelength))
         return phase.height(phase.unwrap(flat), wavelength)
-
-
-def centred(paths: Paths, parts: int = 1) -> Paths:
-    """Paths continued, as plane waves, to the centres of the pixels (or of parts of them) they fall in.
-
-    A ray that lands beside the centre brings the phase of where it landed; summed as it is, a
-    tilted wave would be sampled on a grid other than that of the pixels.
-
-    Parameters
-    ----------
-    paths : Paths
-        All of them detected.
-    parts : int
-        Parts of a pixel along either axis.
-
-    Returns
-    -------
-    Paths
-        With other lengths, L + d . (centre - point), and otherwise the same.
-
-    Raises
-    ------
-    ValueError
-        If the paths were traced without a CCD.
-    """
-    if paths.ccd is None:
-        raise ValueError("centred: expected paths traced onto a CCD, got paths without one")
-    u, v, _ = paths.ccd.axes
-    fine = paths.pixel * parts
-    shift = (np.floor(fine) + 0.5 - fine) * (paths.ccd.pitch / parts)
-    continued = shift[:, 0] * (paths.gradient @ v) + shift[:, 1] * (paths.gradient @ u)
-    return replace(paths, length=paths.length + continued)
 
 
 def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:

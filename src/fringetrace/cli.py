@@ -183,21 +183,25 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
     from rich.console import Console
 
     from fringetrace import measurement
+    from fringetrace.field import chosen
 
     console = Console(highlight=False, soft_wrap=True)
     wavelength = checked_wavelength(parse_length(settings.wavelength, "--wavelength"))
     bench, centre = _bench(mesh, aperture, wavelength, settings)
     with measurement.staged(out) as folder, ThreadPoolExecutor(2) as aside:
         _say_bench(console, name, mesh, bench, wavelength)
-        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
         scene = None
         if settings.picture:
-            scene = aside.submit(_draw, bench, bench.sampled(_few(bench.beam.shape)), folder)
+            few = aside.submit(bench.sampled, _few(bench.beam.shape))
+            scene = aside.submit(_draw, bench, few.result, folder)
+            few.result()  # before the trace, which needs the same trees
+        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
         with _progress("tracing") as advance:
             start = time.perf_counter()
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
-        costing = aside.submit(_costs, bench, wavelength)
+        method = chosen(bench.trace(), bench.method)
+        costing = aside.submit(_costs, bench.trace(), wavelength, method)
         measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)
@@ -252,7 +256,7 @@ def _few(shape: tuple[int, int]) -> tuple[int, int]:
     return rows, columns
 
 
-def _draw(bench: Bench, paths: Paths, folder: Path) -> str | None:
+def _draw(bench: Bench, paths: Callable[[], Paths], folder: Path) -> str | None:
     """scene.png, or why there is none."""
     from fringetrace import views
 
@@ -343,13 +347,12 @@ def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: 
     )
 
 
-def _costs(bench: Bench, wavelength: float) -> tuple[Budget, list[str]]:
+def _costs(paths: Paths, wavelength: float, method: str) -> tuple[Budget, list[str]]:
     """The error budget, and what there is to warn of."""
     from fringetrace import budget, guards
 
-    paths = bench.trace()
-    costs = budget(paths, wavelength, bench.method)
-    return costs, [*guards.found(paths, wavelength, bench.method), *filter(None, [guards.costly(costs)])]
+    costs = budget(paths, wavelength, method)
+    return costs, [*guards.found(paths, wavelength, method), *filter(None, [guards.costly(costs)])]
 
 
 def _rms(measured: Measurement, where: Array) -> str:

@@ -113,6 +113,7 @@ class ShearPlate:
 
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
+    curving: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "ShearPlate axis"))
@@ -224,6 +225,7 @@ class Wollaston:
 
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
+    curving: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Wollaston centre"))

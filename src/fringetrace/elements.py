@@ -75,7 +75,8 @@ class Branch:
 class Element(Protocol):
     """Anything flat that sends rays on in a fixed number of branches.
 
-    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength.
+    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `curving`: it bends
+    plane waves.
     """
 
     @property
@@ -89,6 +90,10 @@ class Element(Protocol):
     @property
     def chromatic(self) -> bool:
         """Whether rays depend on the wavelength."""
+
+    @property
+    def curving(self) -> bool:
+        """Whether plane waves leave it curved."""
 
     def act(self, meeting: Meeting) -> tuple[Branch, ...]:
         """The branches, with a row for each ray."""
@@ -275,6 +280,7 @@ class Annulus:
 
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
+    curving: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -331,6 +337,7 @@ class IdealLens:
 
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
+    curving: ClassVar[bool] = True
     chromatic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:

@@ -97,6 +97,7 @@ class Grating:
     reflects: bool = False
 
     polarised: ClassVar[bool] = False
+    curving: ClassVar[bool] = False
     chromatic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

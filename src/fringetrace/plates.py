@@ -149,6 +149,7 @@ class PhasePlate:
     relief: Formula | Pixels | Spline = field(init=False, repr=False)
 
     polarised: ClassVar[bool] = False
+    curving: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "PhasePlate centre"))

@@ -58,6 +58,7 @@ class Polariser:
 
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
+    curving: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -101,6 +102,7 @@ class Retarder:
 
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
+    curving: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Retarder axis"))
@@ -221,6 +223,7 @@ class JonesPlate:
 
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
+    curving: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:

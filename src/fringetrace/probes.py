@@ -149,7 +149,8 @@ def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
     Returns
     -------
     list of (triangles,) int64
-        A number for the part that each triangle belongs to, one array a surface; below 0 on a form.
+        A number for the part that each triangle belongs to, one array a surface; below 0 on a form, and
+        on elements that curve waves.
     """
     if "parts" not in scene.derived:
         scene.derived["parts"] = [_parts(surface) for surface in scene.surfaces]
@@ -163,7 +164,9 @@ def _parts(surface: Surface) -> npt.NDArray[np.int64]:
     flat = np.ones(len(mesh.faces), dtype=np.bool_)
     if surface.form is not None:
         flat = surface.form.fit(mesh.vertices, mesh.faces).along == 0
-        parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
+    elif getattr(surface.interface, "curving", False):
+        flat[:] = False
+    parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces[flat]], 1, 0)
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)

@@ -67,6 +67,7 @@ def formed(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
         if surface.form is None:
             continue
         body = next(body for body in engine.bodies if body.surfaces == (i,))
+        body.prepare()
         corners = surface.mesh.vertices[surface.mesh.faces]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
         fit = surface.form.fit(surface.mesh.vertices, surface.mesh.faces)
