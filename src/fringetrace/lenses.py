@@ -20,10 +20,10 @@ from fringetrace.interfaces import Absorber, Dielectric, Interface, Metal
 from fringetrace.materials import as_material
 from fringetrace.mesh import Mesh
 from fringetrace.scene import Surface
-from fringetrace.shapes import checked_length, icosphere
+from fringetrace.shapes import icosphere
 from fringetrace.triangles import IndexArray
 from fringetrace.vectors import checked_direction, checked_vector, rotation
-from fringetrace.waves import FloatArray
+from fringetrace.waves import FloatArray, checked_length
 
 Glass = Material | complex | str | None
 Z = np.array([0.0, 0.0, 1.0])

@@ -235,14 +235,31 @@ def _hidden(form: Formed, rays: _Rays, crossed: FloatArray, crossing: Array, bes
     _keep(best, rows[nearer], found, nearer)
 
 
-def _refined(form: Formed, batch: Batch, rows: int, facets: Hits) -> tuple[Array, Meeting]:
-    """Rows of the batch that meet a form, and where."""
-    if form.fit.complete:
-        chosen = np.arange(rows)
-    else:
+def _passing(form: Formed, batch: Batch, rows: int, within: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which rays pass the box around a form before they have gone so far, in metres, or little farther."""
+    body = form.body
+    centre, scale = body.frame[:3], body.frame[3]
+    room = (2.0 * REACH * form.fit.sag + SIDES * form.side) * scale
+    origin, direction = (batch.state[:rows, :3] - centre) * scale, batch.state[:rows, 3:6]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (
+            (corner[0] - origin) / direction for corner in (body.boxes[0] - room, body.boxes[1] + room)
+        )
+    along = np.isnan(one) | np.isnan(other)  # in the plane of a side
+    enter = np.where(along, -np.inf, np.minimum(one, other)).max(axis=1)
+    leave = np.where(along, np.inf, np.maximum(one, other)).min(axis=1)
+    return np.asarray((leave >= np.maximum(enter, 0.0)) & (enter <= within * scale + room))
+
+
+def _refined(
+    form: Formed, batch: Batch, rows: int, facets: Hits, within: FloatArray
+) -> tuple[Array, Meeting]:
+    """Rows of the batch that meet a form before they have gone `within` metres, and where."""
+    wanted = _passing(form, batch, rows, within)
+    if not form.fit.complete:
         last = batch.last[:rows] - form.body.first
-        own = (last >= 0) & (last < len(form.body.faces))
-        chosen = np.flatnonzero(own | (facets.triangle[:rows] >= 0))
+        wanted &= ((last >= 0) & (last < len(form.body.faces))) | (facets.triangle[:rows] >= 0)
+    chosen = np.flatnonzero(wanted)
     rays = _seen(form, batch, chosen)
     face, crossed = facets.triangle[chosen], facets.met[chosen, 0]
     face = np.where(face >= 0, face - form.body.first, -1)
@@ -250,7 +267,7 @@ def _refined(form: Formed, batch: Batch, rows: int, facets: Hits) -> tuple[Array
     _between(form, rays, best)
     if not form.fit.complete:
         _hidden(form, rays, crossed, face, best)
-    hit = np.isfinite(best.path)
+    hit = np.isfinite(best.path) & (best.path < within[chosen])
     return chosen[hit], Meeting(*(column[hit] for column in vars(best).values()))
 
 
@@ -284,14 +301,13 @@ def find(
         if form.surface in passed:
             continue
         doubtful += find_facets(engine, batch, rows, facets, everything - {form.surface})
-        chosen, met = _refined(form, batch, rows, facets)
-        nearer = met.path < hits.met[chosen, 0]
-        chosen, face = chosen[nearer], met.face[nearer]
+        chosen, met = _refined(form, batch, rows, facets, hits.met[:rows, 0])
+        face = met.face
         along = form.fit.along[face]
-        hits.met[chosen, 0] = met.path[nearer]
-        hits.met[chosen, 1:4] = met.point[nearer]
-        hits.met[chosen, 4:7] = met.normal[nearer] * np.where(along == 0, 1, along)[:, None]
-        local = (met.point[nearer] - form.body.frame[:3]) * form.body.frame[3]
+        hits.met[chosen, 0] = met.path
+        hits.met[chosen, 1:4] = met.point
+        hits.met[chosen, 4:7] = met.normal * np.where(along == 0, 1, along)[:, None]
+        local = (met.point - form.body.frame[:3]) * form.body.frame[3]
         edges = form.body.planes[face].reshape(-1, 4, 4)[:, 1:]
         inside = np.einsum("nek,nk->ne", edges[:, :, :3], local) + edges[:, :, 3]
         hits.met[chosen, 7] = inside.min(axis=1)
