@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.bodies import Body
-from fringetrace.crossings import Fit, Meeting
+from fringetrace.crossings import Fit, LevelFit, Meeting, dot
 from fringetrace.engine import Engine, Hits
 from fringetrace.engine import find as find_facets
 from fringetrace.rays import Batch
@@ -200,6 +200,8 @@ def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
         found &= np.einsum("ij,ij->i", best.normal, rays.direction) * sense > 0.0
         untried = ~found if form.fit.complete else rays.own
         rows = np.flatnonzero(untried & ~(rays.own & (rays.leaving == sense)))
+        if isinstance(form.fit, LevelFit) and form.fit.complete:
+            rows = rows[_beside(form, form.fit, rays.part(rows), sense)]
         some, side = rays.part(rows), np.full(len(rows), sense)
         met = form.fit.meet(some.origin, some.direction, np.zeros(len(rows)), side, some.last)
         wanted = (met.path > 0.0) & (met.path < best.path[rows] * (1.0 - START))
@@ -212,6 +214,19 @@ def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
         kept, face = kept[there], face[there]
         met.face[kept] = face
         _keep(best, rows[kept], met, kept)
+
+
+def _beside(form: Formed, fit: LevelFit, rays: _Rays, sense: float) -> npt.NDArray[np.bool_]:
+    """Whether rays meet a quadric, in a sense, where its facets are, or at least in the box around them."""
+    body = form.body
+    centre, room = body.frame[:3], 2.0 * REACH * fit.sag
+    nearest = dot(centre - rays.origin, rays.direction)
+    start = rays.origin + nearest[:, None] * rays.direction
+    way = fit.guess(start, rays.direction, np.full(len(start), sense))
+    lower, upper = (corner[0] / body.frame[3] for corner in body.boxes)
+    with np.errstate(invalid="ignore"):
+        place = start + way[:, None] * rays.direction - centre
+    return np.asarray(((place >= lower - room) & (place <= upper + room)).all(axis=1))
 
 
 def _hidden(form: Formed, rays: _Rays, crossed: FloatArray, crossing: Array, best: Meeting) -> None:
