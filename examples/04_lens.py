@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from matplotlib.figure import Figure
 
 import fringetrace as ft
 from fringetrace import lenses, mm, nm
@@ -34,8 +35,15 @@ for name, (radii, thicknesses, glasses) in CATALOGUE.items():
     bench = ft.instruments.michelson(mirror, aperture=aperture, pixels=(256, 256), rays=1 / 8)
     foot = bench.beam.centre[0] * np.array([0.0, 0.0, 1.0])  # of the arm that holds the sample
     lens = lenses.lens(radii, thicknesses, glasses, 25.4 * mm, vertex=foot, axis=(0, 0, -1), interface=glass)
-    bench = replace(bench, scene=ft.Scene([*bench.scene.surfaces, *lens]))
+    stop = ft.shapes.plate(4 * aperture, 4 * aperture).moved(turn=ft.vectors.rotation((0, 1, 0), math.pi / 2))
+    stop = ft.Surface(
+        stop.moved(1.1 * bench.beam.centre), ft.Absorber(), "isolator"
+    )  # nothing gets to the laser
+    bench = replace(bench, scene=ft.Scene([*bench.scene.surfaces, *lens, stop]))
     images.append(bench.interferogram(wavelength))
     blur = abs(focus[1] - focus[0]) / mm
     print(f"{name}: focal length {focus[0] / mm:.3f} mm behind the vertex, {blur:.3f} mm shorter at the rim")
-ft.views.save(ft.views.interferogram(np.hstack(images), aperture / 256, wavelength=wavelength), "04_lens.png")
+panels = Figure(figsize=(13, 4), layout="constrained").subplots(1, 3)
+for axes, image, name in zip(panels, images, CATALOGUE, strict=True):
+    ft.views.interferogram(image, aperture / 256, axes, wavelength=wavelength, title=name)
+ft.views.save(panels[0], "04_lens.png")
