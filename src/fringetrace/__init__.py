@@ -18,17 +18,22 @@ from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
 from fringetrace.scene import CCD, Beam, Gaussian, Scene, Surface
 from fringetrace.trace import stream, trace
+from fringetrace.validity import Validity, validity
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import (
+        bsdf,
         crystals,
+        cylinders,
         elements,
         films,
         forms,
+        goniometer,
         gratings,
         instruments,
+        lattices,
         lenses,
         materials,
         meshes,
@@ -36,6 +41,11 @@ if TYPE_CHECKING:
         plates,
         polarisers,
         shapes,
+        spectra,
+        spheres,
+        studies,
+        swatches,
+        sweeps,
         vectors,
         views,
     )
@@ -60,17 +70,22 @@ __all__ = [
     "Rays",
     "Scene",
     "Surface",
+    "Validity",
     "bounds",
+    "bsdf",
     "budget",
     "complex_field",
     "crystals",
+    "cylinders",
     "degree",
     "elements",
     "films",
     "forms",
+    "goniometer",
     "gratings",
     "instruments",
     "irradiance",
+    "lattices",
     "lenses",
     "materials",
     "meshes",
@@ -81,17 +96,24 @@ __all__ = [
     "plates",
     "polarisers",
     "shapes",
+    "spectra",
+    "spheres",
     "stream",
+    "studies",
+    "swatches",
+    "sweeps",
     "trace",
     "um",
+    "validity",
     "vectors",
     "views",
 ]
 
 # rooms that are imported at first use
 _ROOMS = (
-    "crystals", "elements", "films", "forms", "gratings", "instruments", "lenses", "materials", "meshes",
-    "phase", "plates", "polarisers", "shapes", "vectors", "views",
+    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "goniometer", "gratings",
+    "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers", "shapes",
+    "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
 )  # fmt: skip
 
 

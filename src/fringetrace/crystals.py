@@ -18,6 +18,7 @@ from fringetrace.elements import (
     Branch,
     Index,
     Meeting,
+    Waves,
     across,
     carried,
     checked_index,
@@ -111,9 +112,9 @@ class ShearPlate:
     ordinary: Index
     extraordinary: Index
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
-    curving: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "ShearPlate axis"))
@@ -223,9 +224,9 @@ class Wollaston:
     extraordinary: Index
     thickness: float = 0.0
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
-    curving: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Wollaston centre"))

@@ -18,6 +18,7 @@ from fringetrace.elements import (
     Branch,
     Index,
     Meeting,
+    Waves,
     across,
     asked,
     checked_index,
@@ -56,9 +57,9 @@ class Polariser:
     axis: FloatArray
     extinction: float = 0.0
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
-    curving: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -100,9 +101,9 @@ class Retarder:
     retardance: float | Callable[[float], float]
     design: float | None = None
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
-    curving: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Retarder axis"))
@@ -221,9 +222,9 @@ class JonesPlate:
     matrix: ComplexArray
     axis: FloatArray
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
-    curving: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
 
     def __post_init__(self) -> None:

@@ -164,7 +164,7 @@ def _parts(surface: Surface) -> npt.NDArray[np.int64]:
     flat = np.ones(len(mesh.faces), dtype=np.bool_)
     if surface.form is not None:
         flat = surface.form.fit(mesh.vertices, mesh.faces).along == 0
-    elif getattr(surface.interface, "curving", False):
+    elif getattr(surface.interface, "waves", "plane") != "plane":
         flat[:] = False
     parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces[flat]], 1, 0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -56,7 +57,7 @@ def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
         From `LEAST` to `MOST`; where that is too few, fringes average out to within a few percent.
     """
     n = np.arange(LEAST, MOST + 1)
-    limits = 4.0 * n / (np.e * np.pi) * ERROR ** (0.5 / n)
+    limits = 4.0 * n / (math.e * np.pi) * ERROR ** (0.5 / n)
     return np.minimum(LEAST + np.searchsorted(limits, cycles), MOST).astype(np.int64)
 
 
