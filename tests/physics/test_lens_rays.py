@@ -190,12 +190,13 @@ def test_light_beside_the_faces_ends_at_the_edge():
     assert paths.length[0] == pytest.approx(0.05 - 12.7 * mm, rel=ROUNDING)
 
 
+@pytest.mark.slow
 def test_facets_cost_what_their_sag_does_to_a_path():
     """(n1 cos i - n2 cos t) times how far the facets stand behind the form, summed over both faces."""
     rng = np.random.default_rng(41)
-    start = np.stack([*rng.uniform(-6 * mm, 6 * mm, (2, 4000)), np.full(4000, -10 * mm)], axis=1)
-    rays, largest = ft.Rays(start, np.tile([0.0, 0.0, 1.0], (4000, 1))), []
-    for rings in (20, 40, 80):
+    start = np.stack([*rng.uniform(-6 * mm, 6 * mm, (2, 2000)), np.full(2000, -10 * mm)], axis=1)
+    rays, largest = ft.Rays(start, np.tile([0.0, 0.0, 1.0], (2000, 1))), []
+    for rings in (16, 32, 64):
         lens = system([(30.0, 4.0, N), (-30.0, 0.0, 1.0)], 20.0, rings=rings)
         smooth = ft.trace(ft.Scene(lens), rays, record=True)
         flat = ft.trace(ft.Scene([replace(surface, form=None) for surface in lens]), rays, record=True)
@@ -206,7 +207,7 @@ def test_facets_cost_what_their_sag_does_to_a_path():
         inside = smooth.points[:, 2] - smooth.points[:, 1]
         inside /= np.linalg.norm(inside, axis=1, keepdims=True)
         waves = [rays.direction, N * inside, smooth.direction]
-        law = np.zeros(4000)
+        law = np.zeros(2000)
         for i in range(2):
             height, normal, _ = lens[i].form.level(flat.points[:, i + 1], rays.direction)
             _, across, _ = lens[i].form.level(smooth.points[:, i + 1], rays.direction)
