@@ -47,7 +47,7 @@ def test_a_plane_gap_between_glass(part, printed):
 def test_irradiance_of_the_rings(part, printed):
     """A lens that touches the flat is a plane gap at each place, but for slopes of 4e-4."""
     gap = part * SODIUM
-    light = seen(glasses(R, 0.0), math.sqrt(gap * (2.0 * R - gap)), 3, 0.2 * um, bounces=11)
+    light = seen(glasses(R, 0.0), math.sqrt(gap * (2.0 * R - gap)), 3, 0.2 * um, bounces=13)
     assert light[1] / COVER == pytest.approx(printed, rel=2e-6)
 
 
