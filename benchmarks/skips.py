@@ -300,11 +300,89 @@ def even(side: int) -> Skip:
     return Skip("one sample a pixel where light is even", "paraboloid with form", image, sampled)
 
 
+def unreached(side: int) -> Skip:
+    """Trees are built for the bodies that rays get near to."""
+    ball = ft.shapes.icosphere(1 * mm, 7).moved((1.0, 0.0, 0.0))
+    plate = ft.shapes.plate(8 * mm, 8 * mm)
+    surfaces = [ft.Surface(plate, ft.Mirror(), name="plate"), ft.Surface(ball, ft.Mirror(), name="ball")]
+    beam = ft.Beam((0, 0, 20 * mm), (0, 0, -1), (0, 1, 0), (4 * mm, 4 * mm), (side, side))
+
+    def fresh() -> list[np.ndarray]:
+        return columns(ft.trace(ft.Scene(surfaces), beam, threads=1))
+
+    def built() -> list[np.ndarray]:
+        scene = ft.Scene(surfaces)
+        for body in build(scene).bodies:
+            body.prepare()
+        return columns(ft.trace(scene, beam, threads=1))
+
+    return Skip("bodies that no ray gets near are not built", "a ball beside a plate", fresh, built)
+
+
+def slab(side: int, index: complex = 1.5, jones: tuple | None = None) -> Callable:
+    """A glass plate, traced at an angle."""
+    plate = ft.shapes.plate(8 * mm, 8 * mm)
+    back = plate.moved((0, 0, -1 * mm), ft.vectors.rotation((0, 1, 0), math.pi))
+    scene = ft.Scene([ft.Surface(side_, ft.Dielectric(), back=index) for side_ in (plate, back)])
+    turn = ft.vectors.rotation((1, 0, 0), 0.3)
+    way = turn @ (0, 0, -1.0)
+    beam = ft.Beam(
+        -5 * mm * way, way, (1, 0, 0), (2 * mm, 2 * mm), (side // 2, side // 2), polarisation=jones
+    )
+    return lambda: columns(ft.trace(scene, beam, wavelength=WAVE, threads=1))
+
+
+def scalar(side: int) -> Skip:
+    """Light without polarisation carries one number."""
+    work = slab(side)
+
+    def numbers() -> list[np.ndarray]:
+        *rest, amplitude, key = work()
+        # that of vectors is their size
+        return [*rest, np.abs(amplitude).astype(complex), key]
+
+    s_light = (0.0, 1.0)
+    return Skip(
+        "light without polarisation: one number a ray", "glass plate", numbers, slab(side, jones=s_light)
+    )
+
+
+def transparent(side: int) -> Skip:
+    """Where no medium absorbs no complex wave vectors are carried."""
+    return Skip("transparent media: real wave vectors", "glass plate", slab(side), slab(side, 1.5 + 1e-300j))
+
+
+def vacuum(side: int) -> Skip:
+    """Scenes of mirrors know no media."""
+    scene, beam = rods(side)
+    immersed = ft.Scene(scene.surfaces, medium=ft.materials.constant(1.0 + 1e-300j))
+
+    def through() -> list[np.ndarray]:
+        return columns(ft.trace(immersed, beam, wavelength=WAVE, threads=1))
+
+    return Skip("mirrors in a vacuum: no media", "80 rods in a box", tracing(scene, beam), through)
+
+
+def extruded(side: int) -> Skip:
+    """A sheet off an extruded scene is swept from one row of rays."""
+    outline = np.array([[-4, 0], [-1, 0], [-1, 0.0004], [1, 0.0004], [1, 0], [4, 0]]) * mm
+    mesh = ft.shapes.extrude(outline, 8 * mm)
+    scene = ft.Scene([ft.Surface(mesh, ft.Mirror())])
+    size = (6 * mm, 6 * mm)
+    ccd = ft.CCD((0, 0, 20 * mm), (0, 0, -1), (0, 1, 0), 5 * mm / 64, (64, 64))
+
+    def image(rows: int) -> Callable:
+        beam = ft.Beam((0, 0, 10 * mm), (0, 0, -1), (0, 1, 0), size, (rows, 64))
+        return lambda: [ft.irradiance(ft.trace(scene, beam, ccd, threads=1), WAVE, "wavefront")]
+
+    return Skip("extruded scene: one row of rays, swept", "a step", image(1), image(64))
+
+
 SKIPS: dict[str, Callable[[int], Skip]] = {
     case.__name__: case
     for case in (
         only_mirrors, in_place, culled, closed, doubted, dropped, unrecorded, uniform, rephased, stepped,
-        differences, even, imported,
+        differences, even, unreached, scalar, transparent, vacuum, extruded, imported,
     )
 }  # fmt: skip
 

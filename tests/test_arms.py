@@ -1,4 +1,4 @@
-"""Which light a phase step turns; rays at the centres of pixels; the slope of a tilted reference."""
+"""Which light a phase step turns; the slope of a tilted reference."""
 
 import math
 
@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import fringetrace as ft
 from fringetrace import mm
-from fringetrace.arms import Mark, centred, path_slope, pixel_centres
+from fringetrace.arms import Mark, path_slope, pixel_centres
 from fringetrace.shapes import plate
 
 
@@ -53,29 +53,6 @@ def test_a_further_branch_of_an_element_has_its_own_count():
     np.testing.assert_array_equal(Mark(0, branch=1).count(paths), np.where(aside, 0, 1))
     np.testing.assert_array_equal(Mark(0, branch=2).count(paths), np.where(aside, 1, 0))
     np.testing.assert_array_equal(Mark(0).count(paths), 1)
-
-
-def test_rays_are_continued_to_the_centre_of_their_part_of_a_pixel():
-    """A plane wave, sampled anywhere: after centring its phase is that of the centres, exactly."""
-    ccd = ft.CCD([0, 0, 0], [0, 0, -1], [0, 1, 0], pitch=1 * mm, shape=(4, 5))
-    random = np.random.default_rng(7)
-    slope = np.array([0.3, -0.2, math.sqrt(1 - 0.13)])
-    at = np.column_stack([random.uniform(-2.4, 2.4, 50), random.uniform(-1.9, 1.9, 50), np.full(50, -1)]) * mm
-    floor = ft.Scene([ft.Surface(plate(1 * mm, 1 * mm).moved((1.0, 1.0, 1.0)), ft.Mirror())])
-    starts = at - slope * 1e-3 * random.uniform(1, 2, (50, 1))
-    paths = ft.trace(floor, ft.Rays(starts, np.tile(slope, (50, 1)), length=starts @ slope), ccd).detected
-    assert len(paths) > 30
-    for parts in (1, 3):
-        moved = centred(paths, parts)
-        cell = (np.floor(paths.pixel * parts) + 0.5) / parts * mm - [2 * mm, 2.5 * mm]
-        wave = cell[:, 1] * slope[0] + cell[:, 0] * slope[1]
-        np.testing.assert_allclose(moved.length, wave, rtol=0, atol=1e-15)
-
-
-def test_paths_without_a_ccd_cannot_be_centred():
-    paths = ft.trace(cavity(), ft.Rays([[0.0, 0.0, 1.0]], [[0.0, 0.0, -1.0]]))
-    with pytest.raises(ValueError, match="centred: expected paths traced onto a CCD"):
-        centred(paths)
 
 
 @settings(max_examples=30, deadline=None)

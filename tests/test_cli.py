@@ -1,5 +1,7 @@
 """The command: what it writes and says, and one clear line for all that can go wrong."""
 
+import contextlib
+import io
 import os
 import re
 import shutil
@@ -22,11 +24,25 @@ FILES = {"frames.tif", "height.png", "interferogram.png", "interferogram.tif", "
 QUICK = ["--pixels", "24", "--no-picture"]
 
 
+def saved_step(folder):
+    meshes.save(step(6 * mm, 4 * mm, 1 * mm, 100 * nm), folder / "step.stl", unit="mm")
+    return folder / "step.stl"
+
+
 @pytest.fixture
 def sample(tmp_path):
-    file = tmp_path / "step.stl"
-    meshes.save(step(6 * mm, 4 * mm, 1 * mm, 100 * nm), file, unit="mm")
-    return file
+    return saved_step(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """One run that several tests look at: its folder and what it said."""
+    folder = tmp_path_factory.mktemp("run")
+    file, said = saved_step(folder), io.StringIO()
+    arguments = [file, "--unit", "mm", "--out", folder / "out", "--wavelength", "532 nm", *QUICK]
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        assert cli.main(["interferogram", *map(os.fspath, arguments)]) == 0
+    return folder / "out", said.getvalue()
 
 
 @pytest.fixture
@@ -48,10 +64,8 @@ def process(*arguments, **options):
     return subprocess.run(text, capture_output=True, text=True, timeout=120, **options)
 
 
-def test_it_writes_all_files_and_says_what_it_did(command, sample, tmp_path):
-    out = tmp_path / "out"
-    code, said, errors = command("interferogram", sample, "--unit", "mm", "--out", out, *QUICK)
-    assert (code, errors) == (0, "")
+def test_it_writes_all_files_and_says_what_it_did(run):
+    out, said = run
     assert {file.name for file in out.iterdir()} == FILES
     for word in (
         "step.stl: 6 triangles", "highest point to z = 0", "image 6 mm x 4 mm", "24 x 16 pixels of 250 um",
@@ -62,18 +76,18 @@ def test_it_writes_all_files_and_says_what_it_did(command, sample, tmp_path):
     assert float(re.search(r"unaccounted for (\S+)", said)[1]) < 1e-12
 
 
-def test_the_files_agree_with_each_other(command, sample, tmp_path):
-    command("interferogram", sample, "--unit", "mm", "--out", tmp_path, "--wavelength", "532 nm", *QUICK)
-    with xarray.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as data:
+def test_the_files_agree_with_each_other(run):
+    folder, _ = run
+    with xarray.open_dataset(folder / "result.nc", engine="h5netcdf") as data:
         assert data.attrs["wavelength_m"] == pytest.approx(532 * nm)
         image, height = data["interferogram"].values, data["height"].values
-    counts = tifffile.imread(tmp_path / "interferogram.tif")
+    counts = tifffile.imread(folder / "interferogram.tif")
     np.testing.assert_allclose(counts[::-1] / 65535, image, atol=1e-5)
     # the step is up, to the right: x = 1 mm of -3 ... 3
     rise = height[:, 17:].mean() - height[:, :15].mean()
     assert rise == pytest.approx(100 * nm, abs=0.1 * nm)
     for name in ("interferogram.png", "height.png"):
-        assert imread(tmp_path / name)[:, :, :3].std() > 0.1
+        assert imread(folder / name)[:, :, :3].std() > 0.1
 
 
 def test_options_reach_the_bench(command, sample, tmp_path):
@@ -97,8 +111,8 @@ def test_fringes_that_alias_are_warned_of(command, sample, tmp_path):
     assert "by 3.16 pi about" in said
 
 
-def test_the_error_budget_is_one_line(command, sample, tmp_path):
-    _, said, _ = command("interferogram", sample, "--unit", "mm", "--out", tmp_path, *QUICK)
+def test_the_error_budget_is_one_line(run):
+    _, said = run
     line = next(line for line in said.splitlines() if line.startswith("budget"))
     terms = re.findall(r"(\w+) (\d\.\de[-+]\d\d)", line)
     assert [name for name, _ in terms] == ["hit", "facets", "sampling", "pixels", "total"]
@@ -114,16 +128,14 @@ def test_steps_that_one_wavelength_cannot_tell_are_named(command, tmp_path):
     )
 
 
-def test_the_folder_is_named_after_the_mesh(command, sample, tmp_path, monkeypatch):
+def test_a_run_replaces_the_one_before_in_the_folder_named_after_the_mesh(
+    command, sample, run, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
-    assert command("interferogram", sample, "--unit", "mm", *QUICK)[0] == 0
-    assert {file.name for file in (tmp_path / "fringetrace-step").iterdir()} == FILES
-
-
-def test_a_second_run_replaces_the_first(command, sample, tmp_path):
-    out = tmp_path / "out"
-    for wavelength in ("500 nm", "600 nm"):
-        command("interferogram", sample, "--unit", "mm", "--out", out, "--wavelength", wavelength, *QUICK)
+    out = tmp_path / "fringetrace-step"
+    shutil.copytree(run[0], out)
+    code, _, errors = command("interferogram", sample, "--unit", "mm", "--wavelength", "600 nm", *QUICK)
+    assert (code, errors) == (0, "")
     with xarray.open_dataset(out / "result.nc", engine="h5netcdf") as data:
         assert data.attrs["wavelength_m"] == pytest.approx(600 * nm)
     assert {file.name for file in out.iterdir()} == FILES
@@ -139,7 +151,7 @@ def test_the_demo_says_how_it_scaled_the_relief(command, tmp_path):
 @pytest.mark.slow
 def test_the_demo_comes_back_within_a_thousandth_of_a_wave(tmp_path):
     done = process("demo", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    assert (done.returncode, done.stderr) == (0, "")
     made = {file.name for file in (tmp_path / "fringetrace-demo").iterdir()}
     missing = ft.views.opengl()
     assert made == FILES | (set() if missing else {"scene.png"})
@@ -351,10 +363,7 @@ def test_a_bench_that_fails_leaves_nothing(command, tmp_path, monkeypatch):
     assert not (tmp_path / "out").exists()
 
 
-def test_it_runs_as_a_command_of_its_own(sample, tmp_path):
-    done = process("interferogram", sample, "--unit", "mm", "--out", "out", *QUICK, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert {file.name for file in (tmp_path / "out").iterdir()} == FILES
+def test_it_fails_as_a_command_of_its_own(tmp_path):
     done = process("interferogram", "missing.stl", "--unit", "mm", cwd=tmp_path)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 import fringetrace as ft
 from fringetrace import nm, shapes
+from fringetrace.engine import build
 from fringetrace.paths import join
 from fringetrace.vectors import rotation
 
@@ -791,3 +792,21 @@ def test_directions_of_any_length():
     expected = bits(ft.trace(scene, ft.Rays(rays.origin, rays.direction)))
     for scale in (2.0**-900, 2.0**-100, 2.0**100, 2.0**1000):
         assert bits(ft.trace(scene, ft.Rays(rays.origin, rays.direction * scale))) == expected
+
+
+def test_bodies_that_no_ray_gets_near_are_not_built():
+    ball = ft.shapes.icosphere(1e-3, 1)
+    scene = ft.Scene(
+        [
+            ft.Surface(ball, ft.Mirror(), name="lit"),
+            ft.Surface(ball.moved((1, 0, 0)), ft.Mirror(), name="aside"),
+        ]
+    )
+    rays = ft.Rays(np.array([[0, 0, 5e-3]]), np.array([[0, 0, -1.0]]))
+    assert ft.trace(scene, rays).bounces[0] == 1
+    lit, aside = build(scene).bodies
+    assert "embree" in vars(lit)
+    assert not {"embree", "tree", "packed"} & set(vars(aside))
+    away = ft.trace(scene, ft.Rays(np.array([[1, 0, 5e-3]]), np.array([[0, 0, -1.0]])))
+    assert away.bounces[0] == 1
+    assert "embree" in vars(aside)

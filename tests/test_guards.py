@@ -196,14 +196,15 @@ def test_loose_rays_have_no_folds():
 # Costly facets.
 
 
-@pytest.mark.parametrize(("cost", "told"), [(0.0499, False), (0.0501, True)])
+@pytest.mark.parametrize(("cost", "told"), [(0.0499, False), (0.0501, True), (0.2, True)])
 def test_facets_over_a_twentieth_wave_are_told(cost, told):
     costs = ft.Budget(0.0, cost, 0.0, 0.0, HENE, "rays", ("lens", 4 * cost))
     text = guards.costly(costs)
     assert (text is not None) == told
     if told:
-        assert "facets cost 0.05 waves rms, over 1/20: those of 'lens' up to 0.2; " in text
-        assert "facets 1.0 times as small" in text
+        assert f"facets cost {cost:.2g} waves rms, over 1/20: those of 'lens' up to {4 * cost:.2g}; " in text
+        # their sag falls as the square of their size
+        assert f"facets {math.sqrt(20 * cost):.1f} times as small" in text
         with pytest.warns(FringetraceWarning, match="facets cost"):
             guards.check_budget(costs)
     else:

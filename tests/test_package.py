@@ -14,10 +14,11 @@ import fringetrace as ft
 ROOT = Path(__file__).resolve().parents[1]
 ROOMS = {path.stem: ast.parse(path.read_text()) for path in Path(ft.__file__).parent.glob("*.py")}
 # What a table of libraries calls by another name than an import statement.
-MODULE = {"scikit-image": "skimage", "pyyaml": "yaml"}
+MODULE = {"scikit-image": "skimage", "pyyaml": "yaml", "colour-science": "colour"}
 HEAVY = [
     "numba", "embreex", "trimesh", "prysm", "scipy", "skimage", "matplotlib", "pyvista", "vtk", "vtkmodules",
-    "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich", "PIL", "yaml",
+    "finufft", "distributed", "dask", "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich",
+    "PIL", "yaml", "colour",
 ]  # fmt: skip
 
 
@@ -39,7 +40,21 @@ def room_map():
     return {room: {MODULE.get(name, name) for name in re.findall(r"[\w-]+", cell)} for room, cell in rows}
 
 
-@pytest.mark.parametrize("room", ["", ".scene", ".shapes", ".trace", ".phase", ".instruments"])
+@pytest.mark.parametrize(
+    "room",
+    [
+        "",
+        ".scene",
+        ".shapes",
+        ".trace",
+        ".phase",
+        ".instruments",
+        ".goniometer",
+        ".commands",
+        ".spectra",
+        ".bsdf",
+    ],
+)
 def test_importing_loads_nothing_heavy(room):
     code = f"import fringetrace{room}, sys; print(*sys.modules)"
     run = subprocess.run(

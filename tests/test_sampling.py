@@ -20,6 +20,28 @@ def plane(count, pixels, angle=0.0, size=1 * mm):
     return arrivals.reflected(beam, ccd, arrivals.plane(angle))
 
 
+def test_rays_are_continued_to_the_centre_of_their_part_of_a_pixel():
+    """A plane wave, sampled anywhere: after centring its phase is that of the centres, exactly."""
+    ccd = ft.CCD([0, 0, 0], [0, 0, -1], [0, 1, 0], pitch=1 * mm, shape=(4, 5))
+    random = np.random.default_rng(7)
+    slope = np.array([0.3, -0.2, math.sqrt(1 - 0.13)])
+    at = np.column_stack([random.uniform(-2.4, 2.4, 50), random.uniform(-1.9, 1.9, 50), np.full(50, -1)]) * mm
+    floor = ft.Scene([ft.Surface(ft.shapes.plate(1 * mm, 1 * mm).moved((1.0, 1.0, 1.0)), ft.Mirror())])
+    starts = at - slope * 1e-3 * random.uniform(1, 2, (50, 1))
+    paths = ft.trace(floor, ft.Rays(starts, np.tile(slope, (50, 1)), length=starts @ slope), ccd).detected
+    assert len(paths) > 30
+    for parts in (1, 3):
+        moved = sampling.centred(paths, parts)
+        cell = (np.floor(paths.pixel * parts) + 0.5) / parts * mm - [2 * mm, 2.5 * mm]
+        wave = cell[:, 1] * slope[0] + cell[:, 0] * slope[1]
+        np.testing.assert_allclose(moved.length, wave, rtol=0, atol=1e-15)
+
+
+def test_paths_without_a_ccd_cannot_be_centred():
+    with pytest.raises(ValueError, match="centred: expected paths traced onto a CCD"):
+        sampling.centred(replace(plane(4, 4), ccd=None))
+
+
 @pytest.mark.parametrize(("rays", "pixels"), [(16, 16), (25, 25), (48, 16), (32, 16)])
 def test_rays_that_fill_the_pixels_cost_nothing(rays, pixels):
     paths = plane(rays, pixels)

@@ -18,23 +18,34 @@ from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
 from fringetrace.scene import CCD, Beam, Gaussian, Scene, Surface
 from fringetrace.trace import stream, trace
+from fringetrace.validity import Validity, validity
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
     __version__: str
     from fringetrace import (
+        bsdf,
         crystals,
+        cylinders,
         elements,
         films,
         forms,
+        goniometer,
         gratings,
         instruments,
+        lattices,
+        lenses,
         materials,
         meshes,
         phase,
         plates,
         polarisers,
         shapes,
+        spectra,
+        spheres,
+        studies,
+        swatches,
+        sweeps,
         vectors,
         views,
     )
@@ -59,17 +70,23 @@ __all__ = [
     "Rays",
     "Scene",
     "Surface",
+    "Validity",
     "bounds",
+    "bsdf",
     "budget",
     "complex_field",
     "crystals",
+    "cylinders",
     "degree",
     "elements",
     "films",
     "forms",
+    "goniometer",
     "gratings",
     "instruments",
     "irradiance",
+    "lattices",
+    "lenses",
     "materials",
     "meshes",
     "mm",
@@ -79,17 +96,24 @@ __all__ = [
     "plates",
     "polarisers",
     "shapes",
+    "spectra",
+    "spheres",
     "stream",
+    "studies",
+    "swatches",
+    "sweeps",
     "trace",
     "um",
+    "validity",
     "vectors",
     "views",
 ]
 
 # rooms that are imported at first use
 _ROOMS = (
-    "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes", "phase",
-    "plates", "polarisers", "shapes", "vectors", "views",
+    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "goniometer", "gratings",
+    "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers", "shapes",
+    "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
 )  # fmt: skip
 
 

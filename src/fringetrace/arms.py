@@ -1,9 +1,9 @@
-"""The arms of a bench: which light a phase step turns, and how its rays reach the centres of pixels."""
+"""The arms of a bench: which light a phase step turns, and how a tilted one rises."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -63,38 +63,6 @@ class Mark:
         """Digits of path keys that stand for a surface, or for one of its branches."""
         mine = [number for number, (there, _) in enumerate(paths.scene.digits, start=1) if there == surface]
         return mine if branch is None else mine[branch : branch + 1]
-
-
-def centred(paths: Paths, parts: int = 1) -> Paths:
-    """Paths continued, as plane waves, to the centres of the pixels (or of parts of them) they fall in.
-
-    A ray that lands beside the centre brings the phase of where it landed; summed as it is, a
-    tilted wave would be sampled on a grid other than that of the pixels.
-
-    Parameters
-    ----------
-    paths : Paths
-        All of them detected.
-    parts : int
-        Parts of a pixel along either axis.
-
-    Returns
-    -------
-    Paths
-        With other lengths, L + n d . (centre - point), and otherwise the same.
-
-    Raises
-    ------
-    ValueError
-        If the paths were traced without a CCD.
-    """
-    if paths.ccd is None:
-        raise ValueError("centred: expected paths traced onto a CCD, got paths without one")
-    u, v, _ = paths.ccd.axes
-    fine = paths.pixel * parts
-    shift = (np.floor(fine) + 0.5 - fine) * (paths.ccd.pitch / parts)
-    continued = shift[:, 0] * (paths.gradient @ v) + shift[:, 1] * (paths.gradient @ u)
-    return replace(paths, length=paths.length + continued)
 
 
 def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:

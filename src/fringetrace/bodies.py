@@ -7,8 +7,9 @@ a 0.3 m instrument keeps all the digits of float32. Nothing else knows Embree.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -62,11 +63,18 @@ class Body:
     surfaces: tuple[int, ...]
     flat: npt.NDArray[np.bool_]  # (s,), a surface that is one plane
     boxes: tuple[FloatArray, FloatArray]  # (s, 3) each, lower and upper, a little larger than the surfaces
+    lock: Lock = field(default_factory=Lock, repr=False)
 
     @property
     def stop(self) -> int:
         """One past the number of its last triangle."""
         return self.first + len(self.faces)
+
+    def prepare(self) -> None:
+        """Build both trees, once, before threads share them: bodies that no ray gets near have none."""
+        if "embree" not in vars(self):
+            with self.lock:
+                _ = self.packed, self.embree
 
     @cached_property
     def embree(self) -> Any:

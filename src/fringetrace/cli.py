@@ -9,12 +9,13 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
+from fringetrace import commands
 from fringetrace.drawing import unit_of
 from fringetrace.mesh import Mesh
 from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length
@@ -31,7 +32,10 @@ app = App(
     name="fringetrace",
     version=fringetrace.__version__,
     help="Triangle meshes to full-field interferograms, with a phase you can trust.",
+    default_parameter=Parameter(consume_multiple=True),
 )
+app.command(commands.brdf)
+app.command(commands.lattice)
 
 FRINGES = 10.0
 # The demo's relief and aperture: slopes that 512 pixels still resolve.
@@ -147,7 +151,7 @@ def bench(
     *,
     out: Path = Path("fringetrace-bench"),
     quick: bool = False,
-    scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    scenes: tuple[str, ...] = (),
 ) -> None:
     """Run time against error on this machine: methods on scenes whose field is known in closed form.
 
@@ -164,8 +168,6 @@ def bench(
     scenes
         Some of paraboloid, sphere, newton, tilt, step, valley, corner_cube. Default: all.
     """
-    from rich.console import Console
-
     from fringetrace import measurement, precision
     from fringetrace.standards import STANDARDS
 
@@ -173,31 +175,33 @@ def bench(
     with measurement.staged(out) as folder, _progress("running") as advance:
         done = list(precision.runs(names, quick, advance))
         precision.write(done, folder)
-    console = Console(highlight=False, soft_wrap=True)
+    console = _console()
     console.print(precision.table(done), markup=False)
     _say(console, "written", f"{out}: {', '.join(precision.FILES)}")
 
 
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
     """Trace, measure, write; say what was done."""
-    from rich.console import Console
-
     from fringetrace import measurement
+    from fringetrace.field import chosen
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = _console()
     wavelength = checked_wavelength(parse_length(settings.wavelength, "--wavelength"))
     bench, centre = _bench(mesh, aperture, wavelength, settings)
     with measurement.staged(out) as folder, ThreadPoolExecutor(2) as aside:
         _say_bench(console, name, mesh, bench, wavelength)
-        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
         scene = None
         if settings.picture:
-            scene = aside.submit(_draw, bench, bench.sampled(_few(bench.beam.shape)), folder)
+            few = aside.submit(bench.sampled, _few(bench.beam.shape))
+            scene = aside.submit(_draw, bench, few.result, folder)
+            few.result()  # before the trace, which needs the same trees
+        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
         with _progress("tracing") as advance:
             start = time.perf_counter()
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
-        costing = aside.submit(_costs, bench, wavelength)
+        method = chosen(bench.trace(), bench.method)
+        costing = aside.submit(_costs, bench.trace(), wavelength, method)
         measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)
@@ -252,7 +256,7 @@ def _few(shape: tuple[int, int]) -> tuple[int, int]:
     return rows, columns
 
 
-def _draw(bench: Bench, paths: Paths, folder: Path) -> str | None:
+def _draw(bench: Bench, paths: Callable[[], Paths], folder: Path) -> str | None:
     """scene.png, or why there is none."""
     from fringetrace import views
 
@@ -288,6 +292,12 @@ def _progress(what: str) -> Iterator[Callable[[int, int], None]]:
 
 def _say(console: Console, what: str, text: str) -> None:
     console.print(f"{what:<12} {text}", markup=False)
+
+
+def _console() -> Console:
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=True)
 
 
 def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength: float) -> None:
@@ -343,13 +353,12 @@ def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: 
     )
 
 
-def _costs(bench: Bench, wavelength: float) -> tuple[Budget, list[str]]:
+def _costs(paths: Paths, wavelength: float, method: str) -> tuple[Budget, list[str]]:
     """The error budget, and what there is to warn of."""
     from fringetrace import budget, guards
 
-    paths = bench.trace()
-    costs = budget(paths, wavelength, bench.method)
-    return costs, [*guards.found(paths, wavelength, bench.method), *filter(None, [guards.costly(costs)])]
+    costs = budget(paths, wavelength, method)
+    return costs, [*guards.found(paths, wavelength, method), *filter(None, [guards.costly(costs)])]
 
 
 def _rms(measured: Measurement, where: Array) -> str:
@@ -377,7 +386,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         command, bound, _ = app.parse_args(arguments, print_error=False, exit_on_error=False)
-        command(*bound.args, **bound.kwargs)
+        for what, text in command(*bound.args, **bound.kwargs) or []:
+            _say(_console(), what, text)
     except (CycloptsError, ValueError, OSError, RuntimeError, MemoryError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
         sys.stderr.write(f"fringetrace: {text}\n")

@@ -18,6 +18,7 @@ from fringetrace.elements import (
     Branch,
     Index,
     Meeting,
+    Waves,
     across,
     carried,
     checked_index,
@@ -111,6 +112,7 @@ class ShearPlate:
     ordinary: Index
     extraordinary: Index
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
 
@@ -222,6 +224,7 @@ class Wollaston:
     extraordinary: Index
     thickness: float = 0.0
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
 

@@ -7,7 +7,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -247,30 +247,37 @@ def _draw(plotter: Plotter, drawing: dict[str, Any]) -> None:
     plotter.camera.zoom(1.05)
 
 
-def _child(code: str, sent: bytes = b"") -> None:
-    """Draw in another process: without its libraries VTK crashes the interpreter it is in."""
-    try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", code], input=sent, capture_output=True, timeout=SECONDS
-        )
-    except subprocess.TimeoutExpired as error:
-        raise RuntimeError(f"3D picture: gave up after {SECONDS:g} s") from error
-    if done.returncode < 0 or done.returncode >= 128:
+def _child(code: str, sent: Callable[[], bytes] = bytes) -> None:
+    """Draw in another process: without its libraries VTK crashes the interpreter it is in.
+
+    What is `sent` there is made while that process starts.
+    """
+    pipe = subprocess.PIPE
+    command = [sys.executable, "-P", "-c", code]
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) as process:
+        try:
+            _, errors = process.communicate(sent(), timeout=SECONDS)
+        except subprocess.TimeoutExpired as error:
+            raise RuntimeError(f"3D picture: gave up after {SECONDS:g} s") from error
+        finally:
+            process.kill()
+    if process.returncode < 0 or process.returncode >= 128:
         raise RuntimeError(
             "3D pictures need OpenGL libraries that this machine lacks (VTK crashed); "
             f"on Debian or Ubuntu: apt-get install {PACKAGES}"
         )
-    if done.returncode:
-        last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+    if process.returncode:
+        last = errors.decode(errors="replace").strip().splitlines()[-1:]
         raise RuntimeError(f"3D picture: {last[0] if last else 'failed'}")
 
 
 def _render() -> None:
-    """In the child: draw what comes on standard input."""
+    """In the child: draw what comes on standard input, once VTK is loaded."""
     import pyvista
 
+    plotter = pyvista.Plotter(off_screen=True)
     drawing, path, size = pickle.load(sys.stdin.buffer)
-    plotter = pyvista.Plotter(off_screen=True, window_size=size)
+    plotter.window_size = size
     _draw(plotter, drawing)
     plotter.screenshot(path)
 
@@ -292,7 +299,7 @@ def opengl() -> str | None:
 
 def picture(
     scene: Scene,
-    paths: Paths | None,
+    paths: Paths | Callable[[], Paths] | None,
     path: str | os.PathLike[str],
     *,
     size: tuple[int, int] = (1600, 1000),
@@ -304,9 +311,10 @@ def picture(
     Parameters
     ----------
     scene : Scene
-    paths : Paths, optional
-        A few hundred, traced with record=True. Those that reached the CCD are drawn; all, if
-        none did. Rays that split are drawn on one of their routes.
+    paths : Paths or callable, optional
+        A few hundred, traced with record=True; or a function that gives them, called while VTK is
+        loaded. Those that reached the CCD are drawn; all, if none did. Rays that split are drawn on
+        one of their routes.
     path : path
     size : (width, height), pixels
     colour : {"route", "length"}
@@ -321,11 +329,14 @@ def picture(
     ValueError
         If the paths have no recorded points, or a name is unknown.
     """
-    drawing = _drawing(scene, paths, colour, relief)
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=target.parent) as folder:
         part = Path(folder, "scene.png")
-        sent = pickle.dumps((drawing, str(part), size))
+
+        def sent() -> bytes:
+            seen = paths() if callable(paths) else paths
+            return pickle.dumps((_drawing(scene, seen, colour, relief), str(part), size))
+
         _child("from fringetrace.drawing import _render; _render()", sent)
         os.replace(part, target)
 

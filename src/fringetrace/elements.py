@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
-from typing import ClassVar, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from fringetrace.waves import Array, ComplexArray, FloatArray
 PARALLEL = 8.0 * float(np.finfo(np.float64).eps)
 
 Index = float | Callable[[float], float]
+Waves = Literal["plane", "curved", "torn"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,8 +76,13 @@ class Branch:
 class Element(Protocol):
     """Anything flat that sends rays on in a fixed number of branches.
 
-    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength.
+    `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: plane waves
+    leave it plane, curved, or torn (neighbouring rays may fare differently).
     """
+
+    @property
+    def waves(self) -> Waves:
+        """How plane waves leave it."""
 
     @property
     def branches(self) -> int:
@@ -177,8 +183,8 @@ def across(axis: FloatArray, direction: FloatArray) -> FloatArray:
     (n, 3) float64
         Unit, or 0 where the axis is along the ray.
     """
-    part = within(np.broadcast_to(axis, direction.shape), direction)
-    part = within(part, direction)  # once more: what rounding left along a ray close to the axis
+    # twice: what rounding leaves along a ray close to the axis
+    part = within(within(np.broadcast_to(axis, direction.shape), direction), direction)
     size = np.sqrt(dot(part, part))
     seen = size > PARALLEL
     return np.where(seen[:, None], part / np.where(seen, size, 1.0)[:, None], 0.0)
@@ -273,6 +279,7 @@ class Annulus:
     inner: float
     outer: float
 
+    waves: ClassVar[Waves] = "torn"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
@@ -329,6 +336,7 @@ class IdealLens:
     focal_length: float
     object_distance: float = np.inf
 
+    waves: ClassVar[Waves] = "curved"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
@@ -373,8 +381,8 @@ class IdealLens:
         size = np.sqrt(dot(chief, chief))
         skew, square = 2.0 * dot(chief, q), dot(q, q)
         arriving, leaving = chief + scaled(q, near), chief - scaled(q, far)
-        sums = [size + np.sqrt(dot(side, side)) for side in (arriving, leaving)]
-        sums = [np.where(total > 0.0, total, 1.0) for total in sums]
+        both = [size + np.sqrt(dot(side, side)) for side in (arriving, leaving)]
+        sums = [np.where(total > 0.0, total, 1.0) for total in both]
         return np.asarray((skew - far * square) / sums[1] - (skew + near * square) / sums[0])
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> IdealLens:

@@ -105,8 +105,6 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
                 offset[i] = first
                 first += len(meshes[i].faces)
                 owner.append(np.full(len(meshes[i].faces), i, dtype=np.int32))
-            # before threads share them
-            _ = body.packed, body.embree
             bodies.append(body)
         scene.derived[name] = Engine(tuple(bodies), np.concatenate(owner), offset)
     engine: Engine = scene.derived[name]
@@ -183,6 +181,7 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
         fresh = False
         if count == 0:
             continue
+        body.prepare()
         prim = body.embree.run(origin32[:count], direction32[:count])
         _second(body, batch, count, prim, hits)
         doubtful += kernels.measure(

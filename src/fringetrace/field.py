@@ -8,8 +8,9 @@ from itertools import chain, groupby
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.landing import along
 from fringetrace.media import at_wavelength
-from fringetrace.paths import Paths, along, join, screen
+from fringetrace.paths import Paths, join, screen
 from fringetrace.scene import Beam
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
 
@@ -22,7 +23,7 @@ def method_for(paths: Paths) -> str:
 
     "wavefront" for a `Beam` whose rays are at least `SHARING` times as many as the flat facets of the
     scene (coplanar triangles are one; surfaces with a form have none), or where those are `FEW`;
-    else "rays".
+    else "rays", as behind elements that tear waves (pixels, stops).
 
     Parameters
     ----------
@@ -34,7 +35,7 @@ def method_for(paths: Paths) -> str:
     """
     from fringetrace.probes import parted
 
-    if not isinstance(paths.source, Beam) or paths.ccd is None:
+    if not isinstance(paths.source, Beam) or paths.ccd is None or torn(paths):
         return "rays"
     most = max(FEW, int(np.prod(paths.source.shape)) // SHARING)
     flat = [surface for surface in paths.scene.surfaces if surface.form is None]
@@ -44,6 +45,21 @@ def method_for(paths: Paths) -> str:
         if sum(facets) > most:
             return "rays"
     return "wavefront"
+
+
+def torn(paths: Paths) -> str | None:
+    """Name of a surface that tears waves: an element behind which neighbouring rays may fare differently.
+
+    Parameters
+    ----------
+    paths : Paths
+
+    Returns
+    -------
+    str or None
+    """
+    surfaces = paths.scene.surfaces
+    return next((s.name for s in surfaces if getattr(s.interface, "waves", None) == "torn"), None)
 
 
 def complex_field(
@@ -202,10 +218,13 @@ def chosen(paths: Paths, method: str) -> str:
     Raises
     ------
     ValueError
-        For any other method.
+        For any other method, or for "wavefront" behind elements that tear waves.
     """
     if method not in ("auto", "wavefront", "rays"):
         raise ValueError(f"method: expected 'auto', 'wavefront' or 'rays', got {method!r}")
+    tears = torn(paths)
+    if method == "wavefront" and tears:
+        raise ValueError(f"method: expected 'rays' behind {tears}, which tears wavefronts, got 'wavefront'")
     return method_for(paths) if method == "auto" else method
 
 

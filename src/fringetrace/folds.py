@@ -39,6 +39,7 @@ from fringetrace.raster import (
     B,
     C,
     gradient,
+    newton,
     patch,
     plain,
     scalar,
@@ -208,11 +209,7 @@ def inside(cells, cell, leaf, sign, s, t, x, y):
         area = xs * yt - xt * ys
         if area * sign <= 0.0:
             return False, s, t, area
-        dx, dy = x - px, y - py
-        ds, dt = (yt * dx - xt * dy) / area, (xs * dy - ys * dx) / area
-        stretch = max(abs(ds) / wide, abs(dt) / tall)
-        if stretch > 0.75:
-            ds, dt = ds * 0.75 / stretch, dt * 0.75 / stretch
+        ds, dt, stretch = newton(px, py, xs, xt, ys, yt, area, x, y, wide, tall)
         if leaf[SIGN] == 0.0:
             ds, dt = halved(cells, cell, sign, s, t, ds, dt)
         s, t = s + ds, t + dt

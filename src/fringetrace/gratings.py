@@ -19,6 +19,7 @@ import numpy.typing as npt
 from fringetrace.elements import (
     Branch,
     Meeting,
+    Waves,
     asked,
     bent,
     checked_length,
@@ -96,6 +97,7 @@ class Grating:
     centre: FloatArray | tuple[float, float, float] = (0.0, 0.0, 0.0)
     reflects: bool = False
 
+    waves: ClassVar[Waves] = "plane"
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = True
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace import tables
 from fringetrace.arms import path_slope, pixel_centres
 from fringetrace.bench import Bench
 from fringetrace.field import chosen
@@ -25,7 +26,7 @@ from fringetrace.paths import Ledger
 from fringetrace.waves import Array, FloatArray
 
 if TYPE_CHECKING:
-    from xarray import Dataset
+    from fringetrace.tables import Dataset
 
 # A bend of this many waves a pixel is a step.
 STEP = 0.02
@@ -226,8 +227,6 @@ def dataset(measurement: Measurement) -> Dataset:
     xarray.Dataset
         Coordinates x, y (metres) and step (radians); units in the attributes of each variable.
     """
-    import xarray
-
     m = measurement
     steps, *shape = m.frames.shape
     x, y = pixel_centres((shape[0], shape[1]), m.pitch)
@@ -260,7 +259,7 @@ def dataset(measurement: Measurement) -> Dataset:
         **{f"power_{name}": value for name, value in vars(m.ledger).items()},
         **{f"version_{name}": version(name) for name in LIBRARIES},
     }
-    return xarray.Dataset(variables, coordinates, attributes)
+    return tables.dataset(variables, coordinates, attributes)
 
 
 def write_netcdf(measurement: Measurement, path: Path) -> None:
@@ -271,7 +270,7 @@ def write_netcdf(measurement: Measurement, path: Path) -> None:
     measurement : Measurement
     path : Path
     """
-    dataset(measurement).to_netcdf(path, engine="h5netcdf")
+    tables.write_netcdf(dataset(measurement), path)
 
 
 def counts(images: FloatArray, full_scale: float) -> Array:

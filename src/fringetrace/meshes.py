@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from fringetrace.mesh import Mesh
 from fringetrace.shapes import (
-    checked_length,
     corner_cube,
     extrude,
     height_map,
@@ -29,7 +28,7 @@ from fringetrace.shapes import (
     step,
 )
 from fringetrace.triangles import IndexArray, height_above, weld
-from fringetrace.waves import FloatArray, unit_length
+from fringetrace.waves import FloatArray, checked_length, unit_length
 
 __all__ = [
     "corner_cube",

@@ -105,29 +105,21 @@ def _slopes(u: FloatArray, v: FloatArray) -> FloatArray:
     """The powers of `_powers` and their derivatives along u and v, (n, 3, 10)."""
     none, one = np.zeros_like(u), np.ones_like(u)
     uu, uv, vv = u * u, u * v, v * v
-    return np.stack(
+    return np.array(
         [
-            np.stack([one, u, v, uu, uv, vv, uu * u, uu * v, u * vv, vv * v], axis=1),
-            np.stack([none, one, none, 2.0 * u, v, none, 3.0 * uu, 2.0 * uv, vv, none], axis=1),
-            np.stack([none, none, one, none, u, 2.0 * v, none, uu, 2.0 * uv, 3.0 * vv], axis=1),
-        ],
-        axis=1,
-    )
+            *[one, u, v, uu, uv, vv, uu * u, uu * v, u * vv, vv * v],
+            *[none, one, none, 2.0 * u, v, none, 3.0 * uu, 2.0 * uv, vv, none],
+            *[none, none, one, none, u, 2.0 * v, none, uu, 2.0 * uv, 3.0 * vv],
+        ]
+    ).T.reshape(-1, 3, 10)
 
 
 def _bends(u: FloatArray, v: FloatArray, p: FloatArray, q: FloatArray) -> FloatArray:
     """Second derivative (n, 10) of the powers along (p, q)."""
-    none, one = np.zeros_like(u), np.ones_like(u)
+    none, two_u, two_v = np.zeros_like(u), 2.0 * u, 2.0 * v
     pp, pq, qq = p * p, 2.0 * p * q, q * q
-    uu, uv, vv = (
-        np.stack(column, axis=1)
-        for column in (
-            [none, none, none, 2.0 * one, none, none, 6.0 * u, 2.0 * v, none, none],
-            [none, none, none, none, one, none, none, 2.0 * u, 2.0 * v, none],
-            [none, none, none, none, none, 2.0 * one, none, none, 2.0 * u, 6.0 * v],
-        )
-    )
-    return np.asarray(pp[:, None] * uu + pq[:, None] * uv + qq[:, None] * vv)
+    mixed = two_v * pp + two_u * pq, two_u * qq + two_v * pq
+    return np.array([none, none, none, 2.0 * pp, pq, 2.0 * qq, 3.0 * two_u * pp, *mixed, 3.0 * two_v * qq]).T
 
 
 @dataclass(frozen=True, eq=False)

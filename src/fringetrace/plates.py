@@ -17,6 +17,7 @@ import numpy.typing as npt
 from fringetrace.elements import (
     Branch,
     Meeting,
+    Waves,
     asked,
     checked_length,
     checked_number,
@@ -189,6 +190,11 @@ class PhasePlate:
     def chromatic(self) -> bool:
         """Whether directions and paths depend on the wavelength."""
         return self.design is not None and not isinstance(self.relief, Pixels)
+
+    @property
+    def waves(self) -> Waves:
+        """Plane waves leave pixels torn, smooth maps curved."""
+        return "torn" if isinstance(self.relief, Pixels) else "curved"
 
     @property
     def branches(self) -> int:

@@ -18,6 +18,7 @@ from fringetrace.elements import (
     Branch,
     Index,
     Meeting,
+    Waves,
     across,
     asked,
     checked_index,
@@ -56,6 +57,7 @@ class Polariser:
     axis: FloatArray
     extinction: float = 0.0
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
     chromatic: ClassVar[bool] = False
@@ -99,6 +101,7 @@ class Retarder:
     retardance: float | Callable[[float], float]
     design: float | None = None
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
 
@@ -219,6 +222,7 @@ class JonesPlate:
     matrix: ComplexArray
     axis: FloatArray
 
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
     chromatic: ClassVar[bool] = False

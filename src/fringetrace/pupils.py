@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.elements import Branch, Meeting, checked_number, dot, scaled, turned, within
+from fringetrace.elements import Branch, Meeting, Waves, checked_number, dot, scaled, turned, within
 from fringetrace.vectors import checked_direction
 from fringetrace.waves import FloatArray
 
@@ -33,6 +33,8 @@ class Pupil:
     axis: FloatArray
     aperture: float
 
+    # a plane wave has one direction: all of it passes, or none
+    waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -56,7 +57,7 @@ def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
         From `LEAST` to `MOST`; where that is too few, fringes average out to within a few percent.
     """
     n = np.arange(LEAST, MOST + 1)
-    limits = 4.0 * n / (np.e * np.pi) * ERROR ** (0.5 / n)
+    limits = 4.0 * n / (math.e * np.pi) * ERROR ** (0.5 / n)
     return np.minimum(LEAST + np.searchsorted(limits, cycles), MOST).astype(np.int64)
 
 
@@ -114,12 +115,12 @@ class Samples:
         mutual : (groups, groups, rows, columns) complex128
             See `averaged`.
         """
-        from fringetrace import raster
+        from fringetrace import tiles
 
         groups, pixels = len(field), len(self.first) - 1
         mean = np.empty((groups, pixels), dtype=np.complex128)
         mutual = np.empty((groups, groups, pixels), dtype=np.complex128)
-        raster.average(self.first, self.weight, field, mean, mutual)
+        tiles.average(self.first, self.weight, field, mean, mutual)
         return mean.reshape(groups, -1, self.columns), mutual.reshape(groups, groups, -1, self.columns)
 
 
@@ -161,9 +162,9 @@ def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
     -------
     Edges
     """
-    from fringetrace import raster
+    from fringetrace import tiles
 
-    pairs = raster.crossed(np.ascontiguousarray(segments), *shape)
+    pairs = tiles.crossed(np.ascontiguousarray(segments), *shape)
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     pixel, begin = np.unique(pairs[:, 0], return_index=True)
     return Edges(segments, pixel, np.append(begin, len(pairs)).astype(np.int64), pairs[:, 1].copy())
@@ -184,7 +185,7 @@ def samples(order: npt.NDArray[np.int64], top: int, cuts: Edges | None = None) -
     -------
     Samples
     """
-    from fringetrace import raster
+    from fringetrace import tiles
 
     columns = order.shape[1]
     order = order.ravel()
@@ -196,14 +197,14 @@ def samples(order: npt.NDArray[np.int64], top: int, cuts: Edges | None = None) -
         # the triangles' points do for a quarter of a cycle: squares enough for the fringes of so many points
         parts = np.maximum(1, (3 * (order[cut] - 3) + 1) // 2)
         begin = cuts.begin[mine.start : mine.stop + 1]
-        pieces, count[cut] = raster.cut(
+        pieces, count[cut] = tiles.cut(
             cuts.pixel[mine], parts, begin, cuts.lines, cuts.segments, columns, TRIANGLE
         )
         order = order.copy()
         order[cut] = 0
     first = np.concatenate([[0], np.cumsum(count)]).astype(np.int64)
     x, y, weight = (np.empty(first[-1]) for _ in range(3))
-    raster.lattice(order, columns, top, *gauss_table(order), first, x, y, weight)
+    tiles.lattice(order, columns, top, *gauss_table(order), first, x, y, weight)
     # rows of the cut pixels, in their order
     into = np.repeat(first[cut], count[cut]) + np.arange(len(pieces))
     into -= np.repeat(np.cumsum(count[cut]) - count[cut], count[cut])

@@ -10,15 +10,15 @@ import numpy.typing as npt
 
 from fringetrace.contacts import indices
 from fringetrace.interfaces import refracted
+from fringetrace.landing import landed
 from fringetrace.outlines import cut
 from fringetrace.paths import Paths
 from fringetrace.probes import RIM, profile
 from fringetrace.quadrature import Samples
-from fringetrace.scene import CCD, Beam
-from fringetrace.sheets import landed
+from fringetrace.scene import CCD, Beam, Surface
 from fringetrace.squares import CORNERS, Pieces, Squares
 from fringetrace.survey import Survey
-from fringetrace.vectors import frame
+from fringetrace.vectors import frame, unit
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
 
@@ -68,32 +68,37 @@ class Region:
     segments: FloatArray
 
 
-def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
-    """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
+def _met(paths: Paths, row: int) -> list[tuple[Surface, FloatArray]]:
+    """The surfaces that a path met, and the normals (3,) of their facets there."""
     assert paths.surface is not None
     assert paths.triangle is not None
+    count = paths.bounces[row]
+    surfaces = [paths.scene.surfaces[number] for number in paths.surface[row, :count]]
+    corners = np.empty((count, 3, 3))
+    for k, (surface, face) in enumerate(zip(surfaces, paths.triangle[row, :count], strict=True)):
+        corners[k] = surface.mesh.vertices[surface.mesh.faces[face]]
+    normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return list(zip(surfaces, normals, strict=True))
+
+
+def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
+    """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
-    u, v, n = frame(beam.direction, beam.up, "Beam")
+    u, v, direction = frame(beam.direction, beam.up, "Beam")
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
-    direction = n
-    bounces = int(paths.bounces[row])
-    points = paths.points[row]
+    legs = np.diff(paths.points[row, 1 : paths.bounces[row] + 1], axis=0)
+    onward = np.concatenate([legs, paths.direction[row, None]])
     index = indices(paths.where(np.array([row])))[0]
-    for bounce in range(bounces):
-        surface = paths.scene.surfaces[paths.surface[row, bounce]]
-        a, b, c = surface.mesh.vertices[surface.mesh.faces[paths.triangle[row, bounce]]]
-        normal = np.cross(b - a, c - a)
-        normal /= np.linalg.norm(normal)
-        onward = paths.direction[row]
-        if bounce + 1 < bounces:
-            onward = points[bounce + 2] - points[bounce + 1]
-            onward = onward / np.linalg.norm(onward)
+    for k, (surface, normal) in enumerate(_met(paths, row)):
+        leaving = onward[k] / np.linalg.norm(onward[k])
         turned = direction - 2.0 * (direction @ normal) * normal
-        bent = refracted(direction, normal, index[bounce], index[bounce + 1])
+        bent = refracted(direction, normal, index[k], index[k + 1])
         if hasattr(surface.interface, "act"):
-            bent = onward
+            bent = leaving
+        # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
+        mirror = getattr(surface.interface, "transmission", None) == 0.0
         # NaN where light is totally reflected
-        if not np.linalg.norm(onward - bent) <= np.linalg.norm(onward - turned):
+        if mirror or not np.linalg.norm(leaving - bent) <= np.linalg.norm(leaving - turned):
             across = across - 2.0 * np.outer(normal, normal @ across)
             direction = turned
         elif bent is not direction:

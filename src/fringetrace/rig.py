@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.arms import Mark, centred
+from fringetrace.arms import Mark
 from fringetrace.field import chosen, complex_field, mutual_intensity, products
 from fringetrace.lines import Line, Spectrum
 from fringetrace.media import at_wavelength, needs
 from fringetrace.paths import Paths
+from fringetrace.sampling import centred
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.trace import stream, trace
 from fringetrace.waves import Array, ComplexArray, checked_wavelength

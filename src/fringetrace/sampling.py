@@ -120,12 +120,43 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
     return _difference(fields, finer)
 
 
+def centred(paths: Paths, parts: int = 1) -> Paths:
+    """Paths continued, as plane waves, to the centres of the pixels (or of parts of them) they fall in.
+
+    A ray that lands beside the centre brings the phase of where it landed; summed as it is, a
+    tilted wave would be sampled on a grid other than that of the pixels.
+
+    Parameters
+    ----------
+    paths : Paths
+        All of them detected.
+    parts : int
+        Parts of a pixel along either axis.
+
+    Returns
+    -------
+    Paths
+        With other lengths, L + d . (centre - point), and otherwise the same.
+
+    Raises
+    ------
+    ValueError
+        If the paths were traced without a CCD.
+    """
+    if paths.ccd is None:
+        raise ValueError("centred: expected paths traced onto a CCD, got paths without one")
+    u, v, _ = paths.ccd.axes
+    fine = paths.pixel * parts
+    shift = (np.floor(fine) + 0.5 - fine) * (paths.ccd.pitch / parts)
+    continued = shift[:, 0] * (paths.gradient @ v) + shift[:, 1] * (paths.gradient @ u)
+    return replace(paths, length=paths.length + continued)
+
+
 def spread(paths: Paths, wavelength: float) -> Paths:
     """Rays that stand for the mean of their plane wave over their part of the pixel that they fall in.
 
     Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
-    part, L + d . (centre - point), and has its amplitude times sinc of the cycles over the part,
-    along either side.
+    part, see `centred`, and has its amplitude times sinc of the cycles over the part, along either side.
 
     Parameters
     ----------
@@ -140,12 +171,9 @@ def spread(paths: Paths, wavelength: float) -> Paths:
     assert paths.ccd is not None
     assert paths.area is not None
     parts = max(1, round(paths.ccd.pitch / math.sqrt(paths.area)))
-    part, (u, v, _) = paths.ccd.pitch / parts, paths.ccd.axes
-    at = paths.pixel * parts
-    shift = (np.floor(at) + 0.5 - at) * part
-    slope = np.stack([paths.gradient @ v, paths.gradient @ u], axis=1)
-    mean = np.sinc(slope * (part / wavelength)).prod(axis=1)
-    return replace(paths, length=paths.length + (shift * slope).sum(axis=1), amplitude=paths.amplitude * mean)
+    cycles = paths.gradient @ np.transpose(paths.ccd.axes[:2]) * (paths.ccd.pitch / parts / wavelength)
+    mean = np.sinc(cycles).prod(axis=1)
+    return replace(centred(paths, parts), amplitude=paths.amplitude * mean)
 
 
 def offset_error(paths: Paths, wavelength: float) -> float:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fringetrace.mesh import Mesh
 from fringetrace.triangles import IndexArray, crossing, doubled_area, triangulate, weld
 from fringetrace.vectors import unit
-from fringetrace.waves import FloatArray
+from fringetrace.waves import FloatArray, checked_length
 
 _G = 0.5 + math.sqrt(1.25)  # golden ratio
 # fmt: off
@@ -28,29 +28,6 @@ ICOSAHEDRON_FACES = np.array([
     [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
 ])
 # fmt: on
-
-
-def checked_length(value: float, what: str) -> float:
-    """The length itself, once it is known to be one.
-
-    Parameters
-    ----------
-    value : float, metres
-    what : str
-        The name used in the error message.
-
-    Returns
-    -------
-    float, metres
-
-    Raises
-    ------
-    ValueError
-        If it is not a positive finite number.
-    """
-    if isinstance(value, str) or not (math.isfinite(value) and value > 0.0):
-        raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
-    return float(value)
 
 
 def _checked_count(value: int, what: str, least: int) -> int:
@@ -241,8 +218,7 @@ def step(width: float, height: float, edge: float, rise: float) -> Mesh:
     checked_length(height, "step height")
     if not -half < edge < half:
         raise ValueError(f"step edge: expected within {half:g} m of the centre, got {edge!r}")
-    if not (math.isfinite(rise) and rise != 0.0):
-        raise ValueError(f"step rise: expected a length in metres other than 0, got {rise!r}")
+    _checked_rise(rise, "step rise")
     return extrude([(-half, 0.0), (edge, 0.0), (edge, rise), (half, rise)], height, name="step")
 
 
@@ -270,8 +246,7 @@ def staircase(width: float, height: float, treads: int, rise: float) -> Mesh:
     """
     count = _checked_count(treads, "staircase treads", 2)
     checked_length(height, "staircase height")
-    if not (math.isfinite(rise) and rise != 0.0):
-        raise ValueError(f"staircase rise: expected a length in metres other than 0, got {rise!r}")
+    _checked_rise(rise, "staircase rise")
     edges = (np.arange(count + 1) / count - 0.5) * checked_length(width, "staircase width")
     x = np.stack([edges[:-1], edges[1:]], axis=1).ravel()
     z = np.repeat(np.arange(count) * rise, 2)

@@ -59,6 +59,29 @@ def _parse(text: str, what: str, units: dict[str, float]) -> float:
     return value
 
 
+def checked_length(value: float, what: str) -> float:
+    """The length itself, once it is known to be one.
+
+    Parameters
+    ----------
+    value : float, metres
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    float, metres
+
+    Raises
+    ------
+    ValueError
+        If it is not a positive finite number.
+    """
+    if isinstance(value, str) or not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
+    return float(value)
+
+
 def parse_length(text: str, what: str = "length") -> float:
     """Length in text, in metres.
 

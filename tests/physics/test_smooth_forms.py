@@ -110,7 +110,7 @@ def test_patches_are_continuous_across_the_sides_of_faces():
 @pytest.mark.parametrize("grazing", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_room_of_patches_keeps_every_ray(grazing):
     rng = np.random.default_rng(3)
-    count, bounces = 400, 40
+    count, bounces = (1600, 10) if grazing else (400, 40)
     mesh = shapes.icosphere(1.0, 3)
     inside = ft.Mesh(mesh.vertices, mesh.faces[:, ::-1])
     start, direction = rng.uniform(-0.4, 0.4, (count, 3)), directions(rng, count)
