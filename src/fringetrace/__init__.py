@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         phase,
         plates,
         polarisers,
+        scenes,
         shapes,
         spectra,
         swatches,
@@ -82,6 +83,7 @@ __all__ = [
     "phase",
     "plates",
     "polarisers",
+    "scenes",
     "shapes",
     "spectra",
     "stream",
@@ -95,7 +97,7 @@ __all__ = [
 # rooms that are imported at first use
 _ROOMS = (
     "bsdf", "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes",
-    "phase", "plates", "polarisers", "shapes", "spectra", "swatches", "vectors", "views",
+    "phase", "plates", "polarisers", "scenes", "shapes", "spectra", "swatches", "vectors", "views",
 )  # fmt: skip
 
 
