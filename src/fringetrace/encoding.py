@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Callable, Mapping
 from numbers import Number
@@ -142,16 +141,14 @@ def _either(several: list[Any]) -> Any:
 
 def _thing(value: Any, hint: Any, keys: Keys, shelf: Shelf) -> dict[str, Any]:
     """A dataclass as a table."""
-    some = members(hint)
-    kind: Any = type(value)
-    if not dataclasses.is_dataclass(kind) or kinds(some).get(kind.__name__) is not kind:
+    some, name = members(hint), type(value).__name__
+    kind: Any = kinds(some).get(name)
+    if kind is None or kind is not type(value):
         raise _refused(value, keys)
     plain = [part for part in concrete(some) if part not in (Mesh, Material)]
-    named = {} if plain == [kind] else {"type": kind.__name__}
-    return {
-        **named,
-        **_arguments(kind, {name: getattr(value, name) for name in parameters(kind)}, keys, shelf),
-    }
+    named = {} if plain == [kind] else {"type": name}
+    given = {key: getattr(value, key) for key in parameters(kind)}
+    return {**named, **_arguments(kind, given, keys, shelf)}
 
 
 def _arguments(
