@@ -61,7 +61,10 @@ def test_materials_are_names_indices_kinds_and_files(read):
 
 
 def test_an_index_of_a_crystal_may_be_the_name_of_a_material(read):
-    text = 'x = { type = "ShearPlate", axis = [1, 0, 1], thickness = "1 mm", ordinary = "calcite o", extraordinary = 1.5 }'
+    text = (
+        'x = { type = "ShearPlate", axis = [1, 0, 1], thickness = "1 mm", ordinary = "calcite o", '
+        "extraordinary = 1.5 }"
+    )
     plate = read(text, ft.elements.Element)
     assert isinstance(plate, crystals.ShearPlate)
     assert plate.ordinary(589 * nm) == CALCITE_O.index(589 * nm)
@@ -85,7 +88,8 @@ def test_kinds_are_tables_or_names(read):
 
 def test_poses_act_in_turn_on_all_that_can_be_moved(read):
     ball = read(
-        'x = { type = "Sphere", centre = [1, 0, 0], radius = 1, pose = [{ axis = [0, 0, 1], angle = "90 deg" }, '
+        'x = { type = "Sphere", centre = [1, 0, 0], radius = 1, '
+        'pose = [{ axis = [0, 0, 1], angle = "90 deg" }, '
         "{ offset = [0, 0, 3] }] }",
         forms.Form,
     )
