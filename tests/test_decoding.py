@@ -207,7 +207,7 @@ ERRORS = {
     "no array": (
         'x = { file = "notes.txt" }',
         FloatArray,
-        "1: x.file: file: expected one named .npy, got 'notes.txt'",
+        "1: x.file: expected one named .npy, got 'notes.txt'",
     ),
     "objects": (
         'x = { file = "odd.npy" }',

@@ -120,9 +120,9 @@ ERRORS = {
         MIRROR + '[bench]\ntype = "michelson"\naperture = 1\n' + SAMPLE,
         "my.toml:1: surface: expected none beside a bench, which brings its own, got some",
     ),
-    "unknown output": ('outputs = ["x.png"]\n' + MIRROR, "1: outputs: outputs: expected one of int"),
-    "no steps": ('\noutputs = ["height.png"]\n' + MIRROR, "2: outputs: outputs: expected a bench for"),
-    "few steps": ("steps = 2\n" + MIRROR, "my.toml:1: steps: steps: expected at least 3, got 2"),
+    "unknown output": ('outputs = ["x.png"]\n' + MIRROR, "1: outputs: expected one of int"),
+    "no steps": ('\noutputs = ["height.png"]\n' + MIRROR, "2: outputs: expected a bench for"),
+    "few steps": ("steps = 2\n" + MIRROR, "my.toml:1: steps: expected at least 3, got 2"),
     "wavelength": ('wavelengths = ["0 nm"]\n' + MIRROR, "wavelength: expected a positive length in metres"),
     "unknown table": (MIRROR + "[camera]", "my.toml:4: camera: expected one of wavelengths, outputs,"),
 }  # fmt: skip

@@ -288,7 +288,7 @@ def _checked(make: Callable[[], Any], value: Mapping[str, Any], place: Place) ->
     except (ValueError, TypeError, OSError) as error:
         text = " ".join(str(error).split())
         about = next((key for key in value if key in text.partition(":")[0].split()), None)
-        raise (place if about is None else place.at(about)).error(text) from None
+        raise (place if about is None else place.at(about)).error(text.removeprefix(f"{about}: ")) from None
 
 
 def _recipe(value: dict[str, Any], place: Place) -> Recipe:

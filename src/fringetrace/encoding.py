@@ -142,9 +142,10 @@ def _either(several: list[Any]) -> Any:
 def _thing(value: Any, hint: Any, keys: Keys, shelf: Shelf) -> dict[str, Any]:
     """A dataclass as a table."""
     some, name = members(hint), type(value).__name__
-    kind: Any = kinds(some).get(name)
-    if kind is None or kind is not type(value):
+    known: dict[str, Any] = kinds(some)
+    if known.get(name) is not type(value):
         raise _refused(value, keys)
+    kind = known[name]
     plain = [part for part in concrete(some) if part not in (Mesh, Material)]
     named = {} if plain == [kind] else {"type": name}
     given = {key: getattr(value, key) for key in parameters(kind)}
