@@ -1,8 +1,61 @@
-"""The commands on scene files, as they are called."""
+"""The commands for structural colour, as the command line calls them."""
+
+import csv
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+import xarray
 
-from fringetrace import cli
+import fringetrace as ft
+from fringetrace import cli, commands, sweeps
+from fringetrace.studies import Lattice
+
+SHORT = ["--angles", "20 deg", "2", "--wavelengths", "400 nm", "600 nm", "5"]
+
+
+@pytest.fixture
+def rods(tmp_path):
+    ft.meshes.save(Lattice(3, 2).mesh, tmp_path / "rods.ply", "um")
+    return tmp_path / "rods.ply"
+
+
+@pytest.mark.parametrize("extra", [["--rays", "1", "200"], ["--hemisphere", "3", "--method", "power"]])
+def test_a_mesh_to_its_brdf(rods, tmp_path, capsys, extra):
+    out = tmp_path / "out"
+    assert cli.main(["brdf", str(rods), "--unit", "um", "--out", str(out), *SHORT, *extra]) == 0
+    said = capsys.readouterr().out
+    assert "rods.ply: 408 triangles" in said
+    assert "reflected" in said
+    assert {file.name for file in out.iterdir()} == set(commands.FILES)
+    with xarray.open_dataarray(out / "brdf.nc", engine="h5netcdf") as table:
+        assert table.shape[0] == 2
+        assert table.shape[4] == 5
+        with (out / "brdf.csv").open() as file:
+            assert [float(row["brdf"]) for row in csv.DictReader(file)] == table.values.ravel().tolist()
+    assert (out / "spectra.png").read_bytes()[:4] == b"\x89PNG"
+
+
+def test_lattices_in_one_call(tmp_path, capsys, monkeypatch):
+    # processes start for seconds; test_sweeps has some
+    monkeypatch.setattr(sweeps, "ProcessPoolExecutor", lambda *_, **__: ThreadPoolExecutor(1))
+    out = tmp_path / "out"
+    given = ["--columns", "3", "--rows", "2", "--pitch", "250 nm", "280 nm", "--disorder", "0", "0.1"]
+    assert cli.main(["lattice", "--out", str(out), "--rays", "100", *SHORT, *given]) == 0
+    assert "4 of pitch, disorder; columns 3, rows 2, radius 65 nm" in capsys.readouterr().out
+    with xarray.open_dataarray(out / "brdf.nc", engine="h5netcdf") as table:
+        assert table.dims[:2] == ("pitch", "disorder")
+        assert table.pitch.values == pytest.approx([250e-9, 280e-9], rel=1e-12)
+    assert len(list((out / "cells").iterdir())) == 4
+
+
+def test_what_is_refused(rods, tmp_path, capsys):
+    out = str(tmp_path / "out")
+    given = ["brdf", str(rods), "--unit", "um", "--out", out]
+    assert cli.main([*given, "--angles", "20 deg", "none"]) == 2
+    assert "--angles: expected a whole number from 1, got 'none'" in capsys.readouterr().err
+    assert cli.main([*given, "--method", "waves"]) == 2
+    assert "method: expected one of rays" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_file_begun_is_a_file_that_runs(tmp_path, monkeypatch, capsys):

@@ -1,4 +1,5 @@
 import os
+import pickle
 import runpy
 import struct
 import subprocess
@@ -473,7 +474,7 @@ def test_what_the_sample_files_hold():
 
 
 def test_an_archive_keeps_every_bit_and_where_it_came_from(tmp_path):
-    mesh = icosphere(1e-3 / 3.0, 2).moved((0.1, 0.2, 0.3))
+    mesh = shapes.icosphere(1e-3 / 3.0, 2).moved((0.1, 0.2, 0.3))
     meshes.save(mesh, tmp_path / "ball.npz", "m")
     back = meshes.load(tmp_path / "ball.npz", "m")
     assert back.vertices.tobytes() == mesh.vertices.tobytes()

@@ -17,8 +17,8 @@ ROOMS = {path.stem: ast.parse(path.read_text()) for path in Path(ft.__file__).pa
 MODULE = {"scikit-image": "skimage", "pyyaml": "yaml", "colour-science": "colour"}
 HEAVY = [
     "numba", "embreex", "trimesh", "prysm", "scipy", "skimage", "matplotlib", "pyvista", "vtk", "vtkmodules",
-    "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich", "PIL", "yaml", "colour",
-    "tomlkit",
+    "finufft", "distributed", "dask", "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich",
+    "PIL", "yaml", "colour", "tomlkit",
 ]  # fmt: skip
 
 
@@ -41,7 +41,19 @@ def room_map():
 
 
 @pytest.mark.parametrize(
-    "room", ["", ".scene", ".shapes", ".trace", ".phase", ".instruments", ".spectra", ".bsdf"]
+    "room",
+    [
+        "",
+        ".scene",
+        ".shapes",
+        ".trace",
+        ".phase",
+        ".instruments",
+        ".goniometer",
+        ".commands",
+        ".spectra",
+        ".bsdf",
+    ],
 )
 def test_importing_loads_nothing_heavy(room):
     code = f"import fringetrace{room}, sys; print(*sys.modules)"

@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from fringetrace import mm, nm, um, views
+from fringetrace import mm, nm, tables, um, views
 
 IMAGE = np.arange(12.0).reshape(3, 4) / 11
 MAPS = (views.interferogram, views.height, views.residual, views.phase)
@@ -133,3 +133,19 @@ def test_a_save_that_fails_leaves_what_was_there(tmp_path):
         views.save(Broken(), file)
     assert file.read_bytes() == b"before"
     assert [path.name for path in tmp_path.iterdir()] == ["view.png"]
+
+
+def test_spectra_have_a_panel_for_each_incidence():
+    axes = ("pitch", "theta_i", "phi_i", "theta_o", "phi_o", "wavelength")
+    values = np.random.default_rng(1).uniform(size=(2, 3, 1, 4, 1, 5))
+    coordinates = {
+        "pitch": ("pitch", [2e-7, 3e-7]), "theta_i": ("theta_i", [-0.5, 0.0, 0.5]),
+        "theta_o": ("theta_o", [-0.3, -0.1, 0.1, 0.3]),
+        "wavelength": ("wavelength", np.linspace(4e-7, 7e-7, 5)),
+    }  # fmt: skip
+    figure = views.spectra(tables.array(values, axes, coordinates, "brdf", {}))
+    panels = [ax for ax in figure.axes if ax.collections and ax.get_title()]
+    assert [ax.get_title() for ax in panels][::5] == ["from -28.6°, pitch 200 nm", "from 28.6°, pitch 300 nm"]
+    drawn = np.asarray(panels[4].collections[0].get_array())
+    assert drawn.ravel() == pytest.approx(values[1, 1, 0, :, 0].ravel())
+    assert views.spectra(tables.array(0 * values, axes, coordinates, "brdf", {})).axes

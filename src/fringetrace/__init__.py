@@ -18,6 +18,7 @@ from fringetrace.paths import Fate, Ledger, Paths
 from fringetrace.rays import Rays
 from fringetrace.scene import CCD, Beam, Gaussian, Scene, Surface
 from fringetrace.trace import stream, trace
+from fringetrace.validity import Validity, validity
 from fringetrace.waves import degree, mm, nm, um
 
 if TYPE_CHECKING:
@@ -25,11 +26,15 @@ if TYPE_CHECKING:
     from fringetrace import (
         bsdf,
         crystals,
+        cylinders,
         elements,
         films,
         forms,
+        goniometer,
         gratings,
         instruments,
+        lattices,
+        lenses,
         materials,
         meshes,
         phase,
@@ -38,7 +43,10 @@ if TYPE_CHECKING:
         scenes,
         shapes,
         spectra,
+        spheres,
+        studies,
         swatches,
+        sweeps,
         vectors,
         views,
     )
@@ -63,18 +71,23 @@ __all__ = [
     "Rays",
     "Scene",
     "Surface",
+    "Validity",
     "bounds",
     "bsdf",
     "budget",
     "complex_field",
     "crystals",
+    "cylinders",
     "degree",
     "elements",
     "films",
     "forms",
+    "goniometer",
     "gratings",
     "instruments",
     "irradiance",
+    "lattices",
+    "lenses",
     "materials",
     "meshes",
     "mm",
@@ -86,18 +99,23 @@ __all__ = [
     "scenes",
     "shapes",
     "spectra",
+    "spheres",
     "stream",
+    "studies",
     "swatches",
+    "sweeps",
     "trace",
     "um",
+    "validity",
     "vectors",
     "views",
 ]
 
 # rooms that are imported at first use
 _ROOMS = (
-    "bsdf", "crystals", "elements", "films", "forms", "gratings", "instruments", "materials", "meshes",
-    "phase", "plates", "polarisers", "scenes", "shapes", "spectra", "swatches", "vectors", "views",
+    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "goniometer", "gratings",
+    "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers", "scenes",
+    "shapes", "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
 )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import numpy as np
 from cyclopts import App, CycloptsError, Parameter
@@ -31,8 +31,10 @@ app = App(
     name="fringetrace",
     version=fringetrace.__version__,
     help="Triangle meshes to full-field interferograms, with a phase you can trust.",
+    default_parameter=Parameter(consume_multiple=True),
 )
-
+app.command(commands.brdf)
+app.command(commands.lattice)
 app.command(commands.run)
 app.command(commands.init)
 
@@ -148,7 +150,7 @@ def bench(
     *,
     out: Path = Path("fringetrace-bench"),
     quick: bool = False,
-    scenes: Annotated[tuple[str, ...], Parameter(consume_multiple=True)] = (),
+    scenes: tuple[str, ...] = (),
 ) -> None:
     """Run time against error on this machine: methods on scenes whose field is known in closed form.
 
@@ -165,8 +167,6 @@ def bench(
     scenes
         Some of paraboloid, sphere, newton, tilt, step, valley, corner_cube. Default: all.
     """
-    from rich.console import Console
-
     from fringetrace import measurement, precision
     from fringetrace.standards import STANDARDS
 
@@ -174,19 +174,17 @@ def bench(
     with measurement.staged(out) as folder, _progress("running") as advance:
         done = list(precision.runs(names, quick, advance))
         precision.write(done, folder)
-    console = Console(highlight=False, soft_wrap=True)
+    console = _console()
     console.print(precision.table(done), markup=False)
     _say(console, "written", f"{out}: {', '.join(precision.FILES)}")
 
 
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
     """Trace, measure, write; say what was done."""
-    from rich.console import Console
-
     from fringetrace import guards, measurement, runs
     from fringetrace.field import chosen
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = _console()
     wavelength = checked_wavelength(parse_length(settings.wavelength, "--wavelength"))
     bench, centre = _bench(mesh, aperture, wavelength, settings)
     with measurement.staged(out) as folder, ThreadPoolExecutor(2) as aside:
@@ -289,6 +287,12 @@ def _say(console: Console, what: str, text: str) -> None:
     console.print(f"{what:<12} {text}", markup=False)
 
 
+def _console() -> Console:
+    from rich.console import Console
+
+    return Console(highlight=False, soft_wrap=True)
+
+
 def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength: float) -> None:
     from fringetrace.bench import path_slope
 
@@ -367,9 +371,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     try:
         command, bound, _ = app.parse_args(arguments, print_error=False, exit_on_error=False)
-        for text in command(*bound.args, **bound.kwargs) or ():
-            sys.stdout.write(f"{text}\n")
-            sys.stdout.flush()
+        for what, text in command(*bound.args, **bound.kwargs) or []:
+            if what:
+                _say(_console(), what, text)
+            else:
+                sys.stdout.write(text)
     except (CycloptsError, ValueError, OSError, RuntimeError, MemoryError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
         sys.stderr.write(f"fringetrace: {text}\n")

@@ -1,12 +1,169 @@
-"""The commands on scene files: run one, or begin one."""
+"""What the command does for structural colour and for scene files: files in, tables and figures out."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
+
+if TYPE_CHECKING:
+    from fringetrace.tables import DataArray
+
+# What there is to say, each under a word.
+Lines = list[tuple[str, str]]
+# Samples of a spectrum from 300 to 700 nm: one a nanometre.
+WAVELENGTHS = ("300 nm", "700 nm", "401")
+FILES = ("brdf.nc", "brdf.csv", "spectra.png")
 
 
-def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False) -> Iterator[str]:
+def brdf(
+    mesh: Path,
+    /,
+    *,
+    unit: str,
+    out: Path | None = None,
+    angles: tuple[str, str] = ("60 deg", "7"),
+    wavelengths: tuple[str, str, str] = WAVELENGTHS,
+    acceptance: str = "0.64 deg",
+    rays: tuple[int, int] = (1, 2000),
+    method: str = "rays",
+    reflectance: float = 1.0,
+    hemisphere: int = 0,
+    threads: int | None = None,
+) -> Lines:
+    """BRDF of a mesh of mirrors, its normal along z: spectra from each angle into each.
+
+    Written to the folder OUT: brdf.nc (labelled, NetCDF), brdf.csv (a row for each pair of angles and
+    wavelength), spectra.png.
+
+    Parameters
+    ----------
+    mesh
+        STL, PLY, OBJ or GLB file.
+    unit
+        Unit of the numbers in it: nm, um, mm, m, ...
+    out
+        Folder to write to. Default: fringetrace-brdf-NAME, in this folder.
+    angles
+        Largest angle in the x-z plane, of light and of observation, and how many from minus to plus.
+    wavelengths
+        First, last, how many.
+    acceptance
+        Half angle of the cone about each direction.
+    rays
+        Along y and along x. Rods along y need one along y.
+    method
+        rays, diffraction, or power (see `fringetrace.goniometer.brdf`).
+    reflectance
+        Of the mesh.
+    hemisphere
+        Observe the whole upper hemisphere instead: so many rings, four times as many sectors.
+    threads
+        Default: one for each core.
+    """
+    from fringetrace import goniometer, measurement, meshes
+    from fringetrace.interfaces import Mirror
+    from fringetrace.scene import Scene, Surface
+
+    sample = meshes.load(mesh, unit=unit)
+    theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
+    detector: goniometer.Cells | goniometer.Cones = goniometer.Cones(
+        theta, parse_angle(acceptance, "--acceptance")
+    )
+    if hemisphere:
+        detector = goniometer.Cells(hemisphere, 4 * hemisphere)
+    scene = Scene((Surface(sample, Mirror(reflectance), mesh.stem),))
+    folder = Path(f"fringetrace-brdf-{mesh.stem}") if out is None else out
+    with measurement.staged(folder) as part:
+        table = goniometer.brdf(
+            scene, theta, detector, _steps(wavelengths, "--wavelengths", parse_length), method=method,
+            rays=rays, threads=threads,
+        )  # fmt: skip
+        _write(table, part)
+    return [
+        ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
+        *_powers(table),
+        ("written", f"{folder}: {', '.join(FILES)}"),
+    ]
+
+
+def lattice(
+    *,
+    out: Path = Path("fringetrace-lattice"),
+    columns: tuple[int, ...] = (20,),
+    rows: tuple[int, ...] = (4,),
+    radius: tuple[str, ...] = ("65 nm",),
+    pitch: tuple[str, ...] = ("280 nm",),
+    arrangement: tuple[str, ...] = ("staggered",),
+    disorder: tuple[float, ...] = (0.0,),
+    seed: tuple[int, ...] = (0,),
+    angles: tuple[str, str] = ("60 deg", "7"),
+    wavelengths: tuple[str, str, str] = WAVELENGTHS,
+    acceptance: str = "0.64 deg",
+    rays: int = 2000,
+    method: str = "rays",
+    scheduler: str | None = None,
+) -> Lines:
+    """BRDF of lattices of mirror rods, for every combination of the values given.
+
+    What is done is kept in OUT/cells as it comes; the same command goes on where it was stopped.
+    Written to the folder OUT: brdf.nc, brdf.csv, spectra.png.
+
+    Parameters
+    ----------
+    out
+        Folder to write to.
+    columns, rows
+        Of rods.
+    radius, pitch
+        Of rods, and from one to the next.
+    arrangement
+        square, staggered or hexagonal.
+    disorder
+        Root mean square of displacements, in pitches.
+    seed
+        Of the displacements.
+    angles, wavelengths, acceptance, method
+        As in `fringetrace brdf`.
+    rays
+        Across a lattice.
+    scheduler
+        Address of a Dask scheduler. Default: this machine's cores.
+    """
+    from fringetrace import measurement, studies
+
+    given: dict[str, Any] = {
+        "columns": columns, "rows": rows, "radius": radius, "pitch": pitch, "arrangement": arrangement,
+        "disorder": disorder, "seed": seed,
+    }  # fmt: skip
+    spoken = dict(given)
+    for name in ("radius", "pitch"):
+        given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
+    base = studies.Lattice(**{name: values[0] for name, values in given.items()})
+    axes = {name: values for name, values in given.items() if len(values) > 1}
+    theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
+    table = studies.study(
+        base, axes, theta, theta, _steps(wavelengths, "--wavelengths", parse_length), rays=rays,
+        half_angle=parse_angle(acceptance, "--acceptance"), method=method,
+        folder=os.fspath(out / "cells"), scheduler=scheduler,
+    )  # fmt: skip
+    with measurement.staged(out) as part:
+        _write(table, part)
+    count = int(np.prod([len(values) for values in axes.values()]))
+    same = ", ".join(f"{name} {values[0]}" for name, values in spoken.items() if name not in axes)
+    return [
+        ("lattices", f"{count} of {', '.join(axes) or 'one kind'}; {same}"),
+        *_powers(table),
+        ("written", f"{out}: {', '.join(FILES)}"),
+    ]
+
+
+def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False) -> Iterator[tuple[str, str]]:
     """Trace a scene file, and write the outputs that it asks for.
 
     Interferograms as PNG, 16-bit TIFF and NetCDF, the complex field, the paths, a picture of the scene; of
@@ -26,11 +183,10 @@ def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False)
 
     setup = scenes.load(scene, allow_outside=allow_outside)
     folder = Path(f"fringetrace-{scene.stem}") if out is None else out
-    for what, text in runs.run(setup, folder):
-        yield f"{what:<12} {text}"
+    yield from runs.run(setup, folder)
 
 
-def init(name: str, /) -> Iterator[str]:
+def init(name: str, /) -> Iterator[tuple[str, str]]:
     """Print a scene file to begin with, as it runs: `fringetrace init michelson > my.toml`.
 
     Parameters
@@ -40,4 +196,35 @@ def init(name: str, /) -> Iterator[str]:
     """
     from fringetrace import templates
 
-    yield templates.template(name).rstrip()
+    yield "", templates.template(name)
+
+
+def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
+    """From first to last in equal steps."""
+    first, last, count = given
+    if not (count.isdigit() and int(count) > 0):
+        raise ValueError(f"{what}: expected a whole number from 1, got {count!r}")
+    return np.linspace(parse(first, what), parse(last, what), int(count))
+
+
+def _write(table: DataArray, folder: Path) -> None:
+    """brdf.nc, brdf.csv, spectra.png."""
+    from fringetrace import tables, views
+
+    tables.write_netcdf(table, folder / "brdf.nc")
+    tables.write_rows(table, folder / "brdf.csv")
+    views.save(views.spectra(table), folder / "spectra.png")
+
+
+def _powers(table: DataArray) -> Lines:
+    """Where the power went at each incidence, and where the BRDF is largest."""
+    shares = []
+    for name in ("reflected", "transmitted", "missed", "absorbed", "truncated"):
+        low, high = float(table[name].min()), float(table[name].max())
+        shares.append(f"{name} {low:.2%}" + (f" to {high:.2%}" if high - low > 5e-5 else ""))
+    top = table.isel(table.argmax(...))
+    where = (
+        f"{float(top):.4g} / sr at {float(top.wavelength) * 1e9:.4g} nm, "
+        f"from {float(top.theta_i) / degree:.3g} to {float(top.theta_o) / degree:.3g} deg"
+    )
+    return [("power", ", ".join(shares)), ("largest", where)]

@@ -345,67 +345,6 @@ def screen(ccd: CCD) -> tuple[float, ...]:
     return tuple(float(number) for number in numbers)
 
 
-def along(paths: Paths, axis: FloatArray) -> Paths:
-    """Paths whose amplitude is the field along an axis.
-
-    Parameters
-    ----------
-    paths : Paths
-        Of light with a polarisation.
-    axis : (3,) float64, unit
-
-    Returns
-    -------
-    Paths
-    """
-    assert paths.field is not None
-    return replace(paths, amplitude=paths.field @ axis)
-
-
-def project(paths: Paths, ccd: CCD) -> Paths:
-    """Let the light that left a scene fall on a CCD beyond it, without a new trace.
-
-    Parameters
-    ----------
-    paths : Paths
-        Traced without a CCD.
-    ccd : CCD
-        Blocks nothing: light reaches it past any surface.
-
-    Returns
-    -------
-    Paths
-        Those that reach the CCD are detected there.
-
-    Raises
-    ------
-    ValueError
-        If the paths were traced onto a CCD already.
-    """
-    if paths.ccd is not None:
-        raise ValueError("project: expected paths traced without a CCD, got paths that have one")
-    u, v, n = ccd.axes
-    facing = paths.direction @ n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = ((ccd.centre - paths.origin) @ n) / facing
-        ahead = (paths.fate == Fate.LEFT) & (facing < 0.0) & (reach > 0.0)
-        reach = np.where(ahead, reach + ccd.focus / facing, 0.0)
-    point = paths.origin + reach[:, None] * paths.direction
-    offset = point - ccd.centre
-    width, height = ccd.size
-    x, y = offset @ u, offset @ v
-    seen = ahead & (abs(x) <= 0.5 * width) & (x < 0.5 * width) & (abs(y) <= 0.5 * height) & (y < 0.5 * height)
-    return replace(
-        paths,
-        fate=np.where(seen, np.int8(Fate.DETECTED), paths.fate),
-        length=np.where(
-            seen, paths.length + reach * (1.0 if paths.index is None else paths.index), paths.length
-        ),
-        origin=np.where(seen[:, None], point, paths.origin),
-        ccd=ccd,
-    )
-
-
 def _padded(columns: Sequence[Array], width: int) -> Array:
     """Arrays of different widths, one below the other."""
     fill = np.nan if columns[0].dtype.kind == "f" else -1

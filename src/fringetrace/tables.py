@@ -48,6 +48,35 @@ def labelled(values: npt.ArrayLike, axes: Axes, *, name: str, unit: str, **attri
     return xarray.DataArray(values, coordinates, list(axes), name=name, attrs={"units": unit, **attributes})
 
 
+def array(
+    values: Any,
+    axes: tuple[str, ...],
+    coordinates: Mapping[str, Any],
+    name: str,
+    attributes: Mapping[str, Any],
+) -> DataArray:
+    """An array whose axes have names, and coordinates of any number.
+
+    Parameters
+    ----------
+    values : array
+    axes : tuple of str
+        One name an axis.
+    coordinates : mapping
+        By name: (axes, values) or (axes, values, attributes).
+    name : str
+    attributes : mapping
+        Unit and meaning, and what else is worth knowing.
+
+    Returns
+    -------
+    xarray.DataArray
+    """
+    import xarray
+
+    return xarray.DataArray(values, dict(coordinates), axes, name=name, attrs=dict(attributes))
+
+
 def dataset(
     variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Mapping[str, Any]
 ) -> Dataset:
@@ -65,7 +94,7 @@ def dataset(
     """
     import xarray
 
-    return xarray.Dataset(variables, coordinates, attributes)
+    return xarray.Dataset(dict(variables), dict(coordinates), dict(attributes))
 
 
 @contextmanager
@@ -88,6 +117,23 @@ def write_netcdf(table: DataArray | Dataset, path: str | os.PathLike[str]) -> No
     """
     with _whole(path) as part:
         table.to_netcdf(part, engine="h5netcdf")
+
+
+def write_rows(table: DataArray, path: str | os.PathLike[str]) -> None:
+    """A table of any number of axes as CSV: a row for each value, after its coordinates, in SI units.
+
+    Parameters
+    ----------
+    table : xarray.DataArray
+    path : path
+        The file is there in full or not at all.
+    """
+    import pandas
+
+    along = np.meshgrid(*(np.asarray(table[name]) for name in table.dims), indexing="ij")
+    columns = {str(name): grid.ravel() for name, grid in zip(table.dims, along, strict=True)}
+    with _whole(path) as part:
+        pandas.DataFrame({**columns, str(table.name): table.values.ravel()}).to_csv(part, index=False)
 
 
 def read_netcdf(path: str | os.PathLike[str]) -> DataArray:

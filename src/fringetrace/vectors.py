@@ -65,7 +65,7 @@ def checked_direction(value: npt.ArrayLike, what: str) -> FloatArray:
     largest = float(np.abs(vector).max())
     if largest == 0.0:
         raise ValueError(f"{what}: expected a direction, got a vector of length 0")
-    if abs(float(np.linalg.norm(vector)) - 1.0) <= ROUNDED:
+    if 0.5 < largest < 2.0 and abs(float(np.linalg.norm(vector)) - 1.0) <= ROUNDED:
         return vector
     vector = vector / largest
     return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)

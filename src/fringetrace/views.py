@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
     from matplotlib.figure import Figure
 
+    from fringetrace.tables import DataArray
+
 __all__ = [
     "height",
     "interferogram",
@@ -25,6 +27,7 @@ __all__ = [
     "residual",
     "save",
     "show",
+    "spectra",
     "work_precision",
 ]
 
@@ -292,6 +295,51 @@ def work_precision(panels: Panels) -> Figure:
             ax.grid(alpha=0.3)
     figure.legend([handles[label] for label in labels], labels, loc="outside lower center", ncols=len(labels))
     return figure
+
+
+def spectra(table: DataArray, columns: int = 4) -> Figure:
+    """A BRDF against wavelength and angle of observation, in the plane of incidence: a panel for each.
+
+    Parameters
+    ----------
+    table : xarray.DataArray
+        As from `goniometer.brdf` (phi taken at the first value), or `studies.study`.
+    columns : int
+        Panels side by side.
+
+    Returns
+    -------
+    matplotlib Figure
+        The scale ends at the 99.5th percentile of what is not 0.
+    """
+    from matplotlib.figure import Figure
+
+    others = [name for name in table.dims if name not in ("theta_o", "phi_o", "phi_i", "wavelength")]
+    flat = table.isel(phi_i=0, phi_o=0).stack(panel=others)
+    values = np.asarray(flat.transpose("panel", "theta_o", "wavelength"))
+    top = float(np.quantile(values[values > 0.0], 0.995)) if (values > 0.0).any() else 1.0
+    rows = -(-len(values) // columns)
+    figure = Figure(figsize=(3.2 * min(columns, len(values)) + 1.0, 2.6 * rows), layout="constrained")
+    panels = figure.subplots(rows, min(columns, len(values)), squeeze=False, sharex=True, sharey=True)
+    edges = 1e9 * np.asarray(table.wavelength), np.rad2deg(table.theta_o)
+    for ax, image, names in zip(panels.flat, values, flat.panel.values, strict=False):
+        drawn = ax.pcolormesh(*edges, image, shading="nearest", vmin=0.0, vmax=top, cmap="viridis")
+        labels = dict(zip(others, names, strict=True))
+        start = f"from {np.rad2deg(labels.pop('theta_i')):.3g}°"
+        ax.set_title(", ".join([start, *(f"{k} {_short(v)}" for k, v in labels.items())]), fontsize="small")
+    for ax in panels.flat[len(values) :]:
+        ax.set_visible(False)
+    figure.supxlabel("wavelength / nm")
+    figure.supylabel("observed at / °")
+    figure.colorbar(drawn, ax=panels, label="BRDF / sr⁻¹")
+    return figure
+
+
+def _short(value: Any) -> str:
+    """A parameter for a title: small lengths in nm."""
+    if isinstance(value, float) and 0.0 < value < 1e-3:
+        return f"{1e9 * value:g} nm"
+    return str(value) if isinstance(value, str) else f"{value:g}"
 
 
 def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
+from fringetrace import goniometer
 from fringetrace import paths as paths_room
 
 DATA = Path(__file__).parents[1] / "data"
@@ -163,3 +164,29 @@ def test_lattice_spectra(lattice, lattice_paths, name, most, loss):
             assert np.abs(np.array(sums) - lattice[name][i, out, ::80]).max() < INTENSITY
             compared += 1
     assert compared > 30
+
+
+def lattice_amplitudes(data, most, loss):
+    """|sums| of the goniometer in the study's place: [ti, to, wavelength]."""
+    rods = ft.shapes.rod_lattice(20, 4, 0.0065 * UNIT, 0.028 * UNIT, 0.2 * UNIT)
+    scene = ft.Scene([ft.Surface(rods.moved((0.727 * UNIT, 0.0, 0.0)), ft.Mirror(), "rods")])
+    theta = np.deg2rad(data["theta"])
+
+    def source(angle, _):
+        i = int(np.argmin(abs(theta - angle)))
+        return ft.Rays(lift(data["org"][i] * UNIT), lift(data["dir"][i]))
+
+    sums = goniometer.amplitudes(
+        scene, theta, goniometer.Pixels(theta, 25 * UNIT, 0.56 * UNIT), data["lam_nm"] * 1e-9, source=source,
+        centre=(1.0 * UNIT, 0.0, 0.042 * UNIT), max_reflections=most, half_wave_loss=loss,
+    )  # fmt: skip
+    return np.abs(sums.values[:, 0, :, 0])
+
+
+@pytest.mark.parametrize("loss", [False, True])
+@pytest.mark.parametrize(("name", "most"), [("le1", 1), ("le2", 2), ("all", None)])
+def test_the_study_s_spectra(lattice, name, most, loss):
+    """Fig 3.5 and 3.6 done again: 49 pairs, 401 wavelengths, all rays, 7,699 of which arrive."""
+    truth = lattice[f"amp_{name}{'_kpi' if loss else ''}"]
+    assert truth.shape == (7, 7, 401)
+    assert np.abs(lattice_amplitudes(lattice, most, loss) - truth).max() < INTENSITY

@@ -1,0 +1,290 @@
+"""BRDF: light from one direction goes into another, at any wavelengths; one trace an incidence."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.detectors import Cells, Cones, Detector, Pixels, checked_angles
+from fringetrace.farfield import FATES, Far, far_field
+from fringetrace.guards import FringetraceWarning
+from fringetrace.illumination import Setup, Source, footprint
+from fringetrace.nufft import checked_wavelengths
+from fringetrace.scene import Scene
+from fringetrace.tables import array
+from fringetrace.waves import FloatArray
+
+if TYPE_CHECKING:
+    from fringetrace.tables import DataArray
+
+__all__ = [
+    "Cells",
+    "Cones",
+    "Pixels",
+    "Setup",
+    "amplitudes",
+    "brdf",
+    "far_field",
+    "footprint",
+    "reciprocity",
+]
+
+METHODS = ("rays", "diffraction", "power")
+AXES = ("theta_i", "phi_i", "theta_o", "phi_o", "wavelength")
+
+Incidence = npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]
+
+
+def _angles(incidence: Incidence) -> tuple[FloatArray, FloatArray]:
+    """Angles theta and phi of a grid of incidences; phi is 0 unless given."""
+    theta, phi = incidence if isinstance(incidence, tuple) else (incidence, 0.0)
+    return checked_angles(theta, "incidence theta", 0.5 * np.pi), checked_angles(phi, "incidence phi")
+
+
+def _check_method(method: str, detector: Detector) -> None:
+    if method not in METHODS:
+        raise ValueError(f"method: expected one of {', '.join(METHODS)}, got {method!r}")
+    if method == "diffraction" and isinstance(detector, Pixels):
+        raise ValueError("method: expected 'rays' or 'power' with Pixels, got 'diffraction'")
+
+
+def _check_spacing(setup: Setup, waves: FloatArray) -> None:
+    """Fraunhofer's sum over a grid of rays has orders of the grid, unless it is fine."""
+    if setup.source is not None:
+        return
+    assert setup.aperture is not None
+    sides = zip(setup.aperture, setup.rays[::-1], strict=True)
+    spacing = max((side / count for side, count in sides if count > 1), default=0.0)
+    if spacing > 0.5 * waves.min():
+        warnings.warn(
+            f"goniometer: rays are {spacing:.3g} m apart, and are a grating with orders of its own unless "
+            f"it is less than half of the shortest wavelength, {waves.min():.3g} m; take more rays",
+            FringetraceWarning,
+            stacklevel=3,
+        )
+
+
+def _density(far: Far, detector: Detector, waves: FloatArray, method: str) -> FloatArray:
+    """(theta, phi, wavelength) float64, 1/sr: power a projected solid angle, over the incident one."""
+    projected = detector.projected[..., None]
+    if method == "power":
+        density = far.power / projected
+    elif isinstance(detector, Pixels):
+        density = np.abs(far.amplitude) ** 2 / (detector.width**2 * projected)
+    else:
+        density = np.abs(far.amplitude) ** 2 / (waves**2 * np.cos(detector.theta)[:, None, None])
+    return np.asarray(density / far.incident)
+
+
+def _coordinates(theta: FloatArray, phi: FloatArray, detector: Detector, waves: FloatArray) -> dict[str, Any]:
+    angle = {"units": "rad"}
+    return {
+        "theta_i": ("theta_i", theta, {**angle, "long_name": "light from: angle from the normal"}),
+        "phi_i": ("phi_i", phi, {**angle, "long_name": "light from: angle about the normal"}),
+        "theta_o": ("theta_o", detector.theta, {**angle, "long_name": "light to: angle from the normal"}),
+        "phi_o": ("phi_o", detector.phi, {**angle, "long_name": "light to: angle about the normal"}),
+        "wavelength": ("wavelength", waves, {"units": "m", "long_name": "vacuum wavelength"}),
+    }
+
+
+def amplitudes(
+    scene: Scene,
+    incidence: Incidence,
+    detector: Detector,
+    wavelengths: npt.ArrayLike,
+    *,
+    method: str = "rays",
+    aperture: tuple[float, float] | None = None,
+    rays: tuple[int, int] = (256, 256),
+    centre: npt.ArrayLike | None = None,
+    source: Source | None = None,
+    **options: Any,
+) -> DataArray:
+    """Complex sums of what goes from each direction into each: the BRDF before it is squared.
+
+    Parameters
+    ----------
+    scene, incidence, detector, wavelengths, method, aperture, rays, centre, source, options
+        As in `brdf`.
+
+    Returns
+    -------
+    xarray.DataArray, complex128, m^2 (rays, where a source's rays have no area)
+        Axes theta_i, phi_i, theta_o, phi_o, wavelength; sum of area * amplitude * exp(i k length).
+        In the far field lengths are those between the planes through the centre.
+
+    Raises
+    ------
+    ValueError
+        As in `brdf`.
+    """
+    theta, phi = _angles(incidence)
+    waves = checked_wavelengths(wavelengths)
+    _check_method(method, detector)
+    setup = Setup(scene, aperture, rays, centre, source)
+    sums = [
+        [far_field(setup, t, p, detector, waves, method=method, **options).amplitude for p in phi]
+        for t in theta
+    ]
+    unit = {"units": "m2", "long_name": "sum of area * amplitude", "method": method}
+    return array(np.array(sums), AXES, _coordinates(theta, phi, detector, waves), "amplitude", unit)
+
+
+def brdf(
+    scene: Scene,
+    incidence: Incidence,
+    detector: Detector,
+    wavelengths: npt.ArrayLike,
+    *,
+    method: str = "rays",
+    aperture: tuple[float, float] | None = None,
+    rays: tuple[int, int] = (256, 256),
+    centre: npt.ArrayLike | None = None,
+    source: Source | None = None,
+    reciprocal: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+    **options: Any,
+) -> DataArray:
+    """Bidirectional reflectance distribution function, radiance over incident irradiance.
+
+    One trace an incidence serves all directions and all wavelengths; where media are dispersive, absorb,
+    or have films, it is one trace a wavelength. Light that meets nothing is left
+    out of the BRDF, but not of the incident power: the aperture is the sample.
+
+    Parameters
+    ----------
+    scene : Scene
+        The sample's normal is +z.
+    incidence : (a,) radians, or ((a,) theta, (b,) phi)
+        Where light comes from, position angles: specular light goes to -theta.
+    detector : Cones, Cells or Pixels
+        Where light goes to.
+    wavelengths : (w,) float64, metres
+    method : {"rays", "diffraction", "power"}
+        "rays": rays that go into a direction's cone, cell or pixel add coherently, as in the 2013
+        study. In the far field |sum of area * amplitude|^2 / wavelength^2 is their power a solid
+        angle (Fraunhofer) in the middle of the cone; a pixel shows the square of its mean field.
+        "diffraction": all rays add coherently in every direction, so that each facet has its lobe;
+        it is of the direction itself, whatever is accepted around it, and takes rays less than half
+        a wavelength apart. "power": powers add, the mean over what is accepted; the same at all
+        wavelengths.
+    aperture, rays, centre, source
+        See `Setup`.
+    reciprocal : bool
+        Sum only pairs with the second direction at or behind the first, and fill in the others by
+        reciprocity; incidence and detector need the same angles. See `reciprocity`.
+    progress : callable, optional
+        Called with (incidences done, incidences in all).
+    options
+        max_bounces : int, surfaces that a path may meet, default 100;
+        max_reflections : int, paths with more are left out of the sums, default none;
+        half_wave_loss : bool, count the -1 of each reflection, default True;
+        tolerance : float, of the sums, see `nufft.spectrum`, default 1e-12;
+        threads : int, of the trace.
+
+    Returns
+    -------
+    xarray.DataArray, float64, 1/sr
+        Axes theta_i, phi_i, theta_o, phi_o, wavelength. With it, at each incidence, the parts of the
+        power that were reflected (upwards), transmitted (downwards), missed, absorbed, truncated: they
+        add up to 1. `collected` (incidence, wavelength) is what the table itself holds, the BRDF
+        summed over its projected solid angles: with "power" and `Cells` it is `reflected`; with
+        `Cones` or `Pixels` it is what falls into them. `ray_count` says how many there were.
+
+    Raises
+    ------
+    ValueError
+        For angles, wavelengths or lengths out of range, an unknown method, "diffraction" onto pixels,
+        polarised light, or `reciprocal` without the same angles on both sides.
+
+    Notes
+    -----
+    F. E. Nicodemus et al., NBS Monograph 160 (1977): f = dL_o / (L_i cos theta_i dw_i).
+    """
+    theta, phi = _angles(incidence)
+    waves = checked_wavelengths(wavelengths)
+    _check_method(method, detector)
+    setup = Setup(scene, aperture, rays, centre, source)
+    if method == "diffraction":
+        _check_spacing(setup, waves)
+    pairs = [(t, p) for t in theta for p in phi]
+    if reciprocal:
+        _check_same(theta, phi, detector)
+    order = np.arange(len(pairs)).reshape(len(theta), len(phi))
+    fars = []
+    for i, (t, p) in enumerate(pairs):
+        chosen = order >= i if reciprocal else None
+        fars.append(far_field(setup, t, p, detector, waves, method=method, chosen=chosen, **options))
+        if progress is not None:
+            progress(i + 1, len(pairs))
+    values = np.stack([_density(far, detector, waves, method) for far in fars])
+    if reciprocal:
+        square = values.reshape(len(pairs), len(pairs), -1)
+        later = np.tri(len(pairs), k=-1, dtype=bool)
+        square[later] = square.transpose(1, 0, 2)[later]
+    return _table(values, fars, theta, phi, detector, waves, method)
+
+
+def _table(
+    values: FloatArray, fars: list[Far], theta: FloatArray, phi: FloatArray, detector: Detector,
+    waves: FloatArray, method: str,
+) -> DataArray:  # fmt: skip
+    """The BRDF with its coordinates, and the power beside it."""
+    grid, into = (len(theta), len(phi)), ("theta_o", "phi_o")
+    collected = np.einsum("iabw,ab->iw", values, detector.projected)
+    coordinates = _coordinates(theta, phi, detector, waves) | {
+        "solid_angle": (into, detector.solid_angle, {"units": "sr"}),
+        "projected": (into, detector.projected, {"units": "sr", "long_name": "solid angle * cos(theta_o)"}),
+        "ray_count": (AXES[:4], np.reshape([far.rays for far in fars], (*grid, *values.shape[1:3]))),
+        "collected": (("theta_i", "phi_i", "wavelength"), collected.reshape(*grid, -1), {"units": "1"}),
+    }
+    for name in FATES:
+        share = np.reshape([far.shares[name] for far in fars], grid)
+        coordinates[name] = (AXES[:2], share, {"units": "1", "long_name": f"power {name} / incident"})
+    attributes = {
+        "units": "sr-1", "long_name": "BRDF", "method": method, "detector": type(detector).__name__,
+        "power_unaccounted": max(abs(sum(far.shares.values()) - 1.0) for far in fars),
+    }  # fmt: skip
+    return array(values.reshape(*grid, *values.shape[1:]), AXES, coordinates, "brdf", attributes)
+
+
+def _check_same(theta: FloatArray, phi: FloatArray, detector: Detector) -> None:
+    if not (np.array_equal(theta, detector.theta) and np.array_equal(phi, detector.phi)):
+        raise ValueError(
+            f"reciprocity: expected the same angles on both sides, got {len(theta)} x {len(phi)} incidences "
+            f"and {len(detector.theta)} x {len(detector.phi)} observations, or others"
+        )
+
+
+def reciprocity(table: DataArray) -> float:
+    """How far a BRDF is from f(i, o) = f(o, i) (Helmholtz), as a part of its largest value.
+
+    It holds for whole samples, lit to beyond their edges, and for parts of even ones; not for pixels
+    at a finite distance, nor for what rays miss between them.
+
+    Parameters
+    ----------
+    table : xarray.DataArray
+        From `brdf`, with the same angles on both sides.
+
+    Returns
+    -------
+    float
+        Largest difference over the largest value; 0 if all are 0.
+
+    Raises
+    ------
+    ValueError
+        If the angles differ.
+    """
+    values = np.asarray(table.values)
+    angles = [np.asarray(table[name]) for name in AXES[:4]]
+    if not (np.array_equal(angles[0], angles[2]) and np.array_equal(angles[1], angles[3])):
+        raise ValueError(f"reciprocity: expected the same angles on both sides, got shape {values.shape}")
+    other = values.transpose(2, 3, 0, 1, 4)
+    top = float(np.abs(values).max())
+    return float(np.abs(values - other).max()) / top if top else 0.0
