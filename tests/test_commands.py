@@ -62,13 +62,11 @@ def test_a_file_begun_is_a_file_that_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["init", "free"]) == 0
     text = capsys.readouterr().out
-    (tmp_path / "my.toml").write_text(text.replace("[128, 128]", "[16, 16]"))
+    (tmp_path / "my.toml").write_text(text.replace("[128, 128]", "[16, 16]").replace("[64, 64]", "[8, 8]"))
     assert cli.main(["run", "my.toml"]) == 0
     said = capsys.readouterr()
     assert said.err == ""
-    assert said.out.startswith(
-        "scene        2 surfaces, 4 triangles; beams: 1 of 64 x 64 rays; 16 x 16 pixels"
-    )
+    assert said.out.startswith("scene        2 surfaces, 4 triangles; beams: 1 of 8 x 8 rays; 16 x 16 pixels")
     assert "\nbudget       of the image: hit " in said.out
     assert "\nwritten      fringetrace-my: field.nc, interferogram.png" in said.out
     assert (tmp_path / "fringetrace-my" / "paths.nc").is_file()
