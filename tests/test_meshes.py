@@ -1,4 +1,5 @@
 import os
+import pickle
 import runpy
 import struct
 import subprocess
@@ -470,3 +471,21 @@ def test_what_the_sample_files_hold():
         mesh = load(name, unit)
         assert trimesh.Trimesh(mesh.vertices, mesh.faces, process=False).is_watertight
     assert len(load("corner_cube.obj", "mm").faces) == 96
+
+
+def test_an_archive_keeps_every_bit_and_where_it_came_from(tmp_path):
+    mesh = shapes.icosphere(1e-3 / 3.0, 2).moved((0.1, 0.2, 0.3))
+    meshes.save(mesh, tmp_path / "ball.npz", "m")
+    back = meshes.load(tmp_path / "ball.npz", "m")
+    assert back.vertices.tobytes() == mesh.vertices.tobytes()
+    assert back.faces.tobytes() == mesh.faces.tobytes()
+    assert (back.source.path, back.source.unit) == (str((tmp_path / "ball.npz").resolve()), "m")
+    assert len(back.moved((1.0, 0.0, 0.0)).source.moves) == 1
+    assert pickle.loads(pickle.dumps(back)).source.path == back.source.path
+
+
+@pytest.mark.parametrize("content", [{}, {"vertices": np.array([{}])}])
+def test_an_archive_of_something_else_is_refused(tmp_path, content):
+    np.savez(tmp_path / "odd.npz", **content)
+    with pytest.raises(ValueError, match=r"odd\.npz: expected an archive of vertices and faces, got"):
+        meshes.load(tmp_path / "odd.npz", "m")

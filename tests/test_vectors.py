@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation
 
 from fringetrace import vectors
@@ -173,3 +174,9 @@ def test_a_component_has_the_same_bits_in_any_company():
     np.testing.assert_allclose(whole, rows @ axis, rtol=0, atol=1e-15)
     alone = np.concatenate([vectors.component(row[None], axis) for row in rows])
     np.testing.assert_array_equal(alone, whole)
+
+
+@given(arrays(np.float64, 3, elements=st.floats(-1e3, 1e3)).filter(lambda v: np.abs(v).max() > 1e-3))
+def test_a_direction_that_is_one_already_stays_to_the_last_bit(vector):
+    once = vectors.checked_direction(vector, "it")
+    assert vectors.checked_direction(once, "it").tobytes() == once.tobytes()

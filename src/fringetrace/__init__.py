@@ -40,6 +40,7 @@ if TYPE_CHECKING:
         phase,
         plates,
         polarisers,
+        scenes,
         shapes,
         spectra,
         spheres,
@@ -95,6 +96,7 @@ __all__ = [
     "phase",
     "plates",
     "polarisers",
+    "scenes",
     "shapes",
     "spectra",
     "spheres",
@@ -112,8 +114,8 @@ __all__ = [
 # rooms that are imported at first use
 _ROOMS = (
     "bsdf", "crystals", "cylinders", "elements", "films", "forms", "goniometer", "gratings",
-    "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers", "shapes",
-    "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
+    "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers", "scenes",
+    "shapes", "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
 )  # fmt: skip
 
 

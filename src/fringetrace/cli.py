@@ -1,4 +1,4 @@
-"""The command: a mesh file to interferogram, frames, height map, one labelled file, and pictures."""
+"""The command: a mesh or scene file to interferogram, frames, height map, one labelled file, pictures."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from fringetrace.bench import Bench
-    from fringetrace.budget import Budget
     from fringetrace.measurement import Measurement
     from fringetrace.paths import Paths
 
@@ -36,6 +35,8 @@ app = App(
 )
 app.command(commands.brdf)
 app.command(commands.lattice)
+app.command(commands.run)
+app.command(commands.init)
 
 FRINGES = 10.0
 # The demo's relief and aperture: slopes that 512 pixels still resolve.
@@ -44,8 +45,6 @@ RELIEF, APERTURE = 2e-6, 8e-3
 UPRIGHT = 1e-9
 # Work that is done sooner needs no progress bar, seconds.
 PATIENCE = 1.0
-# Rays of the 3D picture along the longer side.
-DRAWN = 12
 FAILURE, INTERRUPTED = 2, 130
 
 
@@ -182,7 +181,7 @@ def bench(
 
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
     """Trace, measure, write; say what was done."""
-    from fringetrace import measurement
+    from fringetrace import guards, measurement, runs
     from fringetrace.field import chosen
 
     console = _console()
@@ -192,7 +191,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
         _say_bench(console, name, mesh, bench, wavelength)
         scene = None
         if settings.picture:
-            few = aside.submit(bench.sampled, _few(bench.beam.shape))
+            few = aside.submit(bench.sampled, runs.few(bench.beam.shape))
             scene = aside.submit(_draw, bench, few.result, folder)
             few.result()  # before the trace, which needs the same trees
         truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
@@ -201,7 +200,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
         method = chosen(bench.trace(), bench.method)
-        costing = aside.submit(_costs, bench.trace(), wavelength, method)
+        costing = aside.submit(guards.judged, bench.trace(), wavelength, method)
         measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)
@@ -248,12 +247,6 @@ def _bench(
         rays=settings.rays,
     )
     return bench, top
-
-
-def _few(shape: tuple[int, int]) -> tuple[int, int]:
-    """A grid of rays of the same proportions, few enough to look at."""
-    rows, columns = (max(1, round(DRAWN * n / max(shape))) for n in shape)
-    return rows, columns
 
 
 def _draw(bench: Bench, paths: Callable[[], Paths], folder: Path) -> str | None:
@@ -353,14 +346,6 @@ def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: 
     )
 
 
-def _costs(paths: Paths, wavelength: float, method: str) -> tuple[Budget, list[str]]:
-    """The error budget, and what there is to warn of."""
-    from fringetrace import budget, guards
-
-    costs = budget(paths, wavelength, method)
-    return costs, [*guards.found(paths, wavelength, method), *filter(None, [guards.costly(costs)])]
-
-
 def _rms(measured: Measurement, where: Array) -> str:
     rms = measured.rms(where)
     return f"{rms * 1e9:.3g} nm = {rms / measured.wavelength:.2g} waves rms"
@@ -387,7 +372,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         command, bound, _ = app.parse_args(arguments, print_error=False, exit_on_error=False)
         for what, text in command(*bound.args, **bound.kwargs) or []:
-            _say(_console(), what, text)
+            if what:
+                _say(_console(), what, text)
+            else:
+                sys.stdout.write(text)
     except (CycloptsError, ValueError, OSError, RuntimeError, MemoryError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
         sys.stderr.write(f"fringetrace: {text}\n")

@@ -40,8 +40,8 @@ class Film:
 
     Parameters
     ----------
-    layers : sequence of (material, thickness)
-        Material, index or name, and metres. None at all is a bare face.
+    layers : sequence of (material, thickness in metres)
+        Material, index or name, and its thickness. None at all is a bare face.
 
     Raises
     ------

@@ -15,7 +15,14 @@ import numpy.typing as npt
 
 from fringetrace.crossings import EPSILON, Fit, dot, fit_level
 from fringetrace.patches import patched, vertex_normals
-from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, component, unit
+from fringetrace.vectors import (
+    ROUNDED,
+    checked_direction,
+    checked_rotation,
+    checked_vector,
+    component,
+    unit,
+)
 from fringetrace.waves import FloatArray
 
 # Past its equator by no more than this, in radii squared, a conic is at it.
@@ -325,7 +332,10 @@ class Smooth:
             raise ValueError(
                 f"Smooth normals: expected directions of shape (v, 3), got shape {normals.shape}"
             )
-        object.__setattr__(self, "normals", unit(normals))
+        with np.errstate(over="ignore", under="ignore"):
+            rough = np.abs(np.linalg.norm(normals, axis=1) - 1.0) > ROUNDED
+        normals[rough] = unit(normals[rough])
+        object.__setattr__(self, "normals", normals)
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
         """Patches over a mesh; see `Form`."""

@@ -86,6 +86,25 @@ def check_budget(budget: Budget) -> None:
         warnings.warn(text, FringetraceWarning, stacklevel=3)
 
 
+def judged(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
+    """The error budget of an image, and all that there is to warn of.
+
+    Parameters
+    ----------
+    paths, wavelength, method
+        As in `found`.
+
+    Returns
+    -------
+    Budget
+    list of str
+    """
+    from fringetrace.budget import budget
+
+    costs = budget(paths, wavelength, method)
+    return costs, [*found(paths, wavelength, method), *filter(None, [costly(costs)])]
+
+
 def contradicted(paths: Paths) -> str | None:
     """Whether rays came to a boundary in another medium than it has on that side.
 

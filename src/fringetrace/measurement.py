@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -299,23 +299,40 @@ def write_camera(measurement: Measurement, folder: Path) -> None:
     measurement : Measurement
     folder : Path
     """
+    m = measurement
+    for name, images in (("interferogram", m.interferogram), ("frames", m.frames)):
+        write_counts(folder / f"{name}.tif", images, m.pitch, m.full_scale, wavelength_m=m.wavelength)
+
+
+def write_counts(path: Path, images: FloatArray, pitch: float, full_scale: float, **notes: Any) -> None:
+    """Irradiances as a 16-bit TIFF file, with the full scale in its description.
+
+    Parameters
+    ----------
+    path : Path
+    images : (..., rows, columns) float64
+        |E|^2.
+    pitch : float, metres
+    full_scale : float
+        |E|^2 of 65535 counts.
+    **notes
+        For the description, too.
+    """
     import tifffile
 
-    m = measurement
-    notes = {
-        "full_scale": m.full_scale,
+    described = {
+        "full_scale": full_scale,
         "full_scale_meaning": "|E|^2 of 65535 counts; 1 is the incident irradiance",
-        "wavelength_m": m.wavelength,
-        "pixel_pitch_m": m.pitch,
+        **notes,
+        "pixel_pitch_m": pitch,
         "first_row": "largest y",
     }
-    per_centimetre = 0.01 / m.pitch
-    for name, images in (("interferogram", m.interferogram), ("frames", m.frames)):
-        tifffile.imwrite(
-            folder / f"{name}.tif", counts(images, m.full_scale), photometric="minisblack",
-            description=json.dumps(notes), metadata=None, resolution=(per_centimetre, per_centimetre),
-            resolutionunit="CENTIMETER", software="fringetrace",
-        )  # fmt: skip
+    per_centimetre = 0.01 / pitch
+    tifffile.imwrite(
+        path, counts(images, full_scale), photometric="minisblack", description=json.dumps(described),
+        metadata=None, resolution=(per_centimetre, per_centimetre), resolutionunit="CENTIMETER",
+        software="fringetrace",
+    )  # fmt: skip
 
 
 def write_pictures(measurement: Measurement, folder: Path) -> None:

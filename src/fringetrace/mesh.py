@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -95,6 +95,29 @@ def _check_shape(vertices: FloatArray, faces: npt.NDArray[np.int64], name: str) 
 
 
 @dataclass(frozen=True, eq=False)
+class Source:
+    """Where a mesh came from, by which a scene file can refer to it.
+
+    Parameters
+    ----------
+    path : str
+        Of its file, absolute.
+    unit : str or None
+        Of the numbers in the file.
+    moves : tuple of (offset, turn)
+        What `Mesh.moved` was told since then, in turn.
+    """
+
+    path: str
+    unit: str | None
+    moves: tuple[tuple[FloatArray, FloatArray | None], ...] = ()
+
+    def moved(self, offset: FloatArray, turn: FloatArray | None) -> Source:
+        """The same after one more move."""
+        return Source(self.path, self.unit, (*self.moves, (offset, turn)))
+
+
+@dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles in space.
 
@@ -105,6 +128,8 @@ class Mesh:
         Vertex indices, counter-clockwise seen from the front.
     name : str
         For messages.
+    source : Source, optional
+        The file that it was loaded from.
 
     Raises
     ------
@@ -115,6 +140,7 @@ class Mesh:
     vertices: FloatArray
     faces: npt.NDArray[np.int64]
     name: str = "mesh"
+    source: Source | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
         vertices = _checked_vertices(self.vertices, self.name)
@@ -127,7 +153,7 @@ class Mesh:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # numpy forgets on the way through a pickle that the arrays are not to be written
-        return Mesh, (self.vertices, self.faces, self.name)
+        return Mesh, (self.vertices, self.faces, self.name, self.source)
 
     @staticmethod
     def cleaned(vertices: npt.ArrayLike, faces: npt.ArrayLike, name: str = "mesh") -> Mesh:
@@ -175,8 +201,11 @@ class Mesh:
         ValueError
             If `offset` is no vector or `turn` no rotation.
         """
-        turned = self.vertices if turn is None else self.vertices @ checked_rotation(turn, "turn").T
-        return Mesh(turned + checked_vector(offset, "offset"), self.faces, self.name)
+        rotation = None if turn is None else checked_rotation(turn, "turn")
+        shift = checked_vector(offset, "offset")
+        turned = self.vertices if rotation is None else self.vertices @ rotation.T
+        source = None if self.source is None else self.source.moved(shift, rotation)
+        return Mesh(turned + shift, self.faces, self.name, source)
 
 
 def as_mesh(value: Any, name: str = "mesh") -> Mesh:

@@ -7,15 +7,17 @@ lower: column counts along x, row along y, heights along z, seen from +z.
 from __future__ import annotations
 
 import importlib.util
+import io
 import os
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.mesh import Mesh
+from fringetrace.mesh import Mesh, Source
 from fringetrace.shapes import (
     corner_cube,
     extrude,
@@ -47,7 +49,8 @@ __all__ = [
     "step",
 ]
 
-WRITTEN = (".glb", ".obj", ".ply", ".stl")
+WRITTEN = (".glb", ".npz", ".obj", ".ply", ".stl")
+ARCHIVE = ".npz"
 METROPRO = ".dat"
 # First four bytes of the three versions of Zygo's format.
 METROPRO_MAGIC = (b"\x88\x1b\x03\x6f", b"\x88\x1b\x03\x70", b"\x88\x1b\x03\x71")
@@ -60,10 +63,11 @@ def _existing(path: str | os.PathLike[str]) -> Path:
 
 
 def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
-    """Mesh from a file: STL, PLY, OBJ, GLB, and whatever else trimesh can read; or Zygo MetroPro `.dat`.
+    """Mesh from a file: STL, PLY, OBJ, GLB, and whatever else trimesh can read; Zygo MetroPro `.dat`; `.npz`.
 
     Vertices with equal coordinates are welded and faces without area dropped. A file of several
     parts becomes one mesh, each part where the file puts it; the faces of a part keep their order.
+    An `.npz` archive holds the arrays `vertices` and `faces`, which are taken as they are.
 
     Parameters
     ----------
@@ -85,13 +89,20 @@ def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
         If the kind of file is unknown, the unit missing or unknown, the file empty or not
         what its name says, or what is in it is no mesh (see `Mesh`).
     """
+    mesh = _loaded(path, unit)
+    return replace(mesh, source=Source(str(Path(path).resolve()), unit))
+
+
+def _loaded(path: str | os.PathLike[str], unit: str | None) -> Mesh:
     suffix = Path(path).suffix.lower()
     if suffix == METROPRO:
         z, pitch = read_height_map(path)
         return height_map(z, pitch, name=Path(path).name)
+    if suffix == ARCHIVE:
+        return _archived(_existing(path), unit_length(unit, f"{Path(path).name} unit"))
     from trimesh.exchange.load import mesh_formats
 
-    known = sorted({METROPRO} | {f".{kind}" for kind in mesh_formats()})
+    known = sorted({METROPRO, ARCHIVE} | {f".{kind}" for kind in mesh_formats()})
     if suffix not in known:
         raise ValueError(f"{path}: expected a file named {', '.join(known)}, got {suffix or 'no suffix'!r}")
     file = _existing(path)
@@ -101,6 +112,16 @@ def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
         return Mesh.cleaned(vertices * scale, faces, file.name)
     except ValueError:
         return Mesh(vertices * scale, faces, file.name)  # names the faces if none had an area
+
+
+def _archived(file: Path, scale: float) -> Mesh:
+    """A mesh out of numpy's archive, to the last bit: nothing is welded or dropped."""
+    try:
+        with np.load(file, allow_pickle=False) as data:
+            vertices, faces = data["vertices"], data["faces"]
+    except Exception as error:  # a zip file cut short, an array left out, objects in it
+        raise ValueError(f"{file}: expected an archive of vertices and faces, got {error}") from error
+    return Mesh(vertices * scale, faces, file.name)
 
 
 def _parsed(file: Path) -> tuple[FloatArray, IndexArray]:
@@ -145,9 +166,9 @@ def _refuse_relative(file: Path) -> None:
 
 
 def save(mesh: Mesh, path: str | os.PathLike[str], unit: str) -> None:
-    """Write a mesh to a STL (binary), PLY, OBJ or GLB file.
+    """Write a mesh to a STL (binary), PLY, OBJ, GLB or NPZ file.
 
-    OBJ keeps coordinates to 17 decimals of the unit, the others keep 7 digits (float32). The file
+    NPZ keeps all bits (of metres), OBJ 17 decimals of the unit, the others 7 digits (float32). The file
     is written beside its target and then moved into place.
 
     Parameters
@@ -164,23 +185,31 @@ def save(mesh: Mesh, path: str | os.PathLike[str], unit: str) -> None:
     OSError
         If the file cannot be written.
     """
-    import trimesh
-
     file = Path(path)
-    kind = file.suffix.lower()
-    if kind not in WRITTEN:
-        raise ValueError(f"{path}: expected a file named {', '.join(WRITTEN)}, got {kind or 'no suffix'!r}")
-    scaled = trimesh.Trimesh(
-        mesh.vertices / unit_length(unit, f"{file.name} unit"), mesh.faces, process=False
-    )
-    options: dict[str, Any] = {"digits": 17, "include_normals": False} if kind == ".obj" else {}
-    content: Any = scaled.export(file_type=kind[1:], **options)
+    if file.suffix.lower() not in WRITTEN:
+        raise ValueError(
+            f"{path}: expected a file named {', '.join(WRITTEN)}, got {file.suffix or 'no suffix'!r}"
+        )
+    content = _content(mesh.vertices / unit_length(unit, f"{file.name} unit"), mesh.faces, file)
     beside = file.with_name(f".{file.name}.{os.getpid()}.part")
     try:
         beside.write_bytes(content.encode() if isinstance(content, str) else content)
         os.replace(beside, file)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _content(vertices: FloatArray, faces: IndexArray, file: Path) -> Any:
+    """What is in the file, bytes or text."""
+    kind = file.suffix.lower()
+    if kind == ARCHIVE:
+        held = io.BytesIO()
+        np.savez(held, vertices=vertices, faces=faces)
+        return held.getvalue()
+    import trimesh
+
+    options: dict[str, Any] = {"digits": 17, "include_normals": False} if kind == ".obj" else {}
+    return trimesh.Trimesh(vertices, faces, process=False).export(file_type=kind[1:], **options)
 
 
 def read_height_map(path: str | os.PathLike[str]) -> tuple[FloatArray, float]:

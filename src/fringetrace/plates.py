@@ -25,7 +25,7 @@ from fringetrace.elements import (
     turned,
 )
 from fringetrace.gratings import blazed, checked_orders, diffracted
-from fringetrace.vectors import checked_direction, checked_vector, component, frame
+from fringetrace.vectors import ROUNDED, checked_direction, checked_vector, component, frame
 from fringetrace.waves import FloatArray
 
 Map = Callable[[FloatArray, FloatArray], FloatArray]
@@ -225,7 +225,9 @@ class PhasePlate:
 def _plane_axes(right: npt.ArrayLike, up: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Unit vectors of x and y."""
     _, y, x = frame(right, up, "PhasePlate")
-    return x, y
+    given = checked_direction(up, "PhasePlate up")
+    # axes that are at right angles stay as they are, to the last bit
+    return x, (given if abs(float(given @ x)) <= ROUNDED else y)
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,7 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
         fine = replace(ccd, pitch=0.5 * ccd.pitch, shape=(2 * rows, 2 * columns))
         fields.append(complex_field(replace(paths, ccd=ccd), wavelength, "wavefront"))
         image = complex_field(replace(paths, ccd=fine), wavelength, "wavefront")
-        finer.append(image.reshape(rows, 2, columns, 2).mean(axis=(1, 3)))
+        finer.append(image.reshape(*image.shape[:-2], rows, 2, columns, 2).mean(axis=(-3, -1)))
     return _difference(fields, finer)
 
 

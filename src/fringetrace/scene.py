@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fringetrace.interfaces import Dielectric, Interface, Metal
 from fringetrace.mesh import Mesh, as_mesh
-from fringetrace.vectors import checked_direction, checked_vector, frame
+from fringetrace.vectors import ROUNDED, checked_direction, checked_vector, frame
 from fringetrace.waves import ComplexArray, FloatArray
 
 if TYPE_CHECKING:
@@ -178,7 +178,7 @@ def _checked_jones(value: Any) -> ComplexArray:
     size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
     if not (np.isfinite(size) and size > 0.0):
         raise ValueError(f"Beam polarisation: expected a Jones vector of two numbers, got {value!r}")
-    return vector / size
+    return vector if abs(size - 1.0) <= ROUNDED else vector / size
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,8 @@ from fringetrace.waves import FloatArray
 
 # A matrix that changes lengths by more than this part was not meant as a rotation.
 STRETCH = 1e-9
+# What rounding leaves of a length of 1, or of a right angle: scaling again would only change last bits.
+ROUNDED = 4.0 * float(np.finfo(np.float64).eps)
 
 
 def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
@@ -41,7 +43,7 @@ def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
 
 
 def checked_direction(value: npt.ArrayLike, what: str) -> FloatArray:
-    """One direction, scaled to unit length.
+    """One direction, scaled to unit length; a unit vector stays as it is, to the last bit.
 
     Parameters
     ----------
@@ -63,6 +65,8 @@ def checked_direction(value: npt.ArrayLike, what: str) -> FloatArray:
     largest = float(np.abs(vector).max())
     if largest == 0.0:
         raise ValueError(f"{what}: expected a direction, got a vector of length 0")
+    if 0.5 < largest < 2.0 and abs(float(np.linalg.norm(vector)) - 1.0) <= ROUNDED:
+        return vector
     vector = vector / largest
     return np.asarray(vector / np.linalg.norm(vector), dtype=np.float64)
 

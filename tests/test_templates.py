@@ -1,0 +1,26 @@
+"""Scene files to begin with: each runs as it is."""
+
+import pytest
+
+from fringetrace import scenes
+from fringetrace.bench import Bench
+from fringetrace.runs import run
+from fringetrace.templates import template
+from fringetrace.vocabulary import kinds, parameters
+
+
+@pytest.mark.parametrize("name", ["free", *kinds([Bench])])
+def test_each_template_runs_and_says_all_that_can_be_said(name, tmp_path):
+    text = template(name).replace("[64, 64]", "[8, 8]")
+    setup = scenes.parsed(text.replace("[128, 128]", "[16, 16]"), f"{name}.toml", tmp_path)
+    said = list(run(setup, tmp_path / "out"))
+    assert "note" not in dict(said)
+    assert {file.name for file in (tmp_path / "out").iterdir()} == set(setup.outputs)
+    if setup.bench is not None:
+        for parameter in parameters(kinds([Bench])[name]):
+            assert f"{parameter} = " in text or f"[bench.{parameter}]" in text
+
+
+def test_an_unknown_template_is_refused():
+    with pytest.raises(ValueError, match=r"template: expected one of free, .*, did you mean 'michelson'\?"):
+        template("michelsen")
