@@ -173,9 +173,17 @@ class Lattice:
         if media:
             found["absorbing"] = {_clear(medium): medium for medium in media}
         if self.host is not None:
-            x, width = _across(self)
-            found |= {"aperture": (width, self.length + self.pitch), "centre": (x, 0.0, self.front)}
+            found |= {"aperture": self.footprint, "centre": (_across(self)[0], 0.0, self.front)}
         return found
+
+    @property
+    def footprint(self) -> tuple[float, float]:
+        """Width along x and length along y that are lit, metres: the host's face, or the box around rods."""
+        width, length = _across(self)[1], self.length
+        if self.host is not None:
+            return width + self.pitch, length + self.pitch
+        (low, _, _), (high, _, _) = self.mesh.bounds
+        return float(high - low), length
 
     @property
     def cylinders(self) -> Cylinders:
@@ -273,18 +281,18 @@ def _surfaces(
 
 
 def _across(lattice: Lattice) -> tuple[float, float]:
-    """Middle and width of the front face along x, metres."""
+    """Middle and width of the rods along x, metres."""
     x = lattice.centres[:, 0]
     low, high = x.min() - lattice.radius, x.max() + lattice.radius
-    return float(0.5 * (low + high)), float(high - low + lattice.pitch)
+    return float(0.5 * (low + high)), float(high - low)
 
 
 def _half_space(lattice: Lattice) -> list[Surface]:
     """The host's front face, and black walls down to below the rods."""
-    x, width = _across(lattice)
+    x, (width, length) = _across(lattice)[0], lattice.footprint
     low = float(lattice.centres[:, 1].min()) - lattice.radius
     depth = lattice.front - low + lattice.pitch
-    box = plate(width, lattice.length + lattice.pitch, depth).moved((x, 0.0, lattice.front))
+    box = plate(width, length, depth).moved((x, 0.0, lattice.front))
     walls = np.delete(box.faces, [0, 1, 4, 5], axis=0)  # its first and third side: front and bottom
     front = Mesh(box.vertices, box.faces[:2], "front")
     return [

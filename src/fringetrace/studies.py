@@ -6,14 +6,17 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.cylinders import differential_width, scatter
 from fringetrace.detectors import Cones, checked_angles
 from fringetrace.farfield import FATES
 from fringetrace.goniometer import AXES, brdf
+from fringetrace.harmonics import Polarisation
+from fringetrace.lattices import spectrum
 from fringetrace.nufft import checked_wavelengths
 from fringetrace.rods import MEDIA
 from fringetrace.rods import Lattice as Lattice
@@ -33,11 +36,127 @@ def _cell(
 ) -> dict[str, FloatArray]:  # fmt: skip
     """One lattice: its BRDF in the plane across the rods, and where the power went."""
     lattice = Lattice(**parameters | {name: media.get(parameters[name]) for name in MEDIA})
+    if method == "rods":
+        values = cluster(lattice, theta_i, theta_o, wavelengths)
+        unknown = np.full((len(values), 1), np.nan)
+        return {"brdf": values[:, None, :, None], **dict.fromkeys(FATES, unknown)}
     table = brdf(
         lattice.scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths, method=method,
         rays=(1, rays), max_bounces=max_bounces, min_amplitude=min_amplitude, threads=1, **lattice.lighting,
     )  # fmt: skip
     return {"brdf": table.values, **{name: table[name].values for name in FATES}}
+
+
+def cluster(
+    lattice: Lattice,
+    theta_i: npt.ArrayLike,
+    theta_o: npt.ArrayLike,
+    wavelengths: npt.ArrayLike,
+    polarisation: Polarisation = "E",
+) -> FloatArray:
+    """BRDF of a lattice in the plane across its rods, by rigorous multiple scattering.
+
+    f = (length / wavelength) (d sigma / d theta) / (width cos theta_i cos theta_o): rods of a length of
+    many waves send d sigma / d theta into a lobe that is wavelength / length wide along them, and its
+    middle is what ray sums give in the same plane. A host's front face lets light in and out (Snell,
+    Fresnel); what it throws back, of the incident light or from below, is left out.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Rods may not overlap.
+    theta_i, theta_o : (n,) radians
+        Position angles, outside of the host.
+    wavelengths : (w,) float64, metres
+    polarisation : ``"E"`` or ``"H"``
+        The field along the rods. Rays take the amplitudes of "E".
+
+    Returns
+    -------
+    (theta_i, theta_o, wavelength) float64, 1/sr
+
+    Raises
+    ------
+    ValueError
+        As `cylinders.Cylinders` and `cylinders.scatter`; for mirrors that absorb.
+    """
+    start, end = checked_angles(theta_i, "cluster theta_i"), checked_angles(theta_o, "cluster theta_o")
+    rods, (width, _) = lattice.cylinders, lattice.footprint
+    values = []
+    for wave in checked_wavelengths(wavelengths):
+        host = 1.0 if lattice.host is None else float(lattice.host.index(wave).real)
+        (inward, into), (outward, out) = (_through(host, angle, polarisation) for angle in (start, end))
+        scattered = scatter(rods, float(wave), -np.pi / 2 - inward, polarisation)
+        sent = differential_width(scattered, np.pi / 2 - outward)
+        # a width is over the irradiance inside; an angle outside is wider than that inside
+        wider = np.cos(end) / (host * np.cos(outward))
+        entered = into * np.cos(start) / np.cos(inward)
+        whole = lattice.length / wave * entered[:, None] * sent * out * wider
+        values.append(whole / (width * np.cos(start)[:, None] * np.cos(end)))
+    return np.stack(values, axis=-1)
+
+
+def _through(host: float, angle: FloatArray, polarisation: Polarisation) -> tuple[FloatArray, FloatArray]:
+    """Angles inside of a host, and the parts of the power that pass its face."""
+    inside = np.arcsin(np.sin(angle) / host)
+    here, there = np.cos(angle), host * np.cos(inside)
+    if polarisation == "H":
+        here, there = here * host, there / host
+    return inside, 4.0 * here * there / (here + there) ** 2
+
+
+def specular(
+    lattice: Lattice,
+    theta_i: npt.ArrayLike,
+    wavelengths: npt.ArrayLike,
+    *,
+    method: str = "rods",
+    polarisation: Polarisation | Literal["unpolarised"] = "unpolarised",
+) -> DataArray:
+    """What a lattice of rows that never end reflects, rigorously or as a multilayer.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Without disorder; its columns do not matter.
+    theta_i : (n,) radians
+        From where, outside of the host.
+    wavelengths : (w,) float64, metres
+    method, polarisation
+        See `lattices.spectrum`.
+
+    Returns
+    -------
+    xarray.DataArray, float64, 1
+        Axes theta_i, wavelength: reflected over incident power, all diffraction orders together; with
+        the transmitted part, and what rays would be worth.
+
+    Raises
+    ------
+    ValueError
+        As `Lattice.endless` and `lattices.spectrum`.
+    """
+    start, waves = checked_angles(theta_i, "specular theta_i"), checked_wavelengths(wavelengths)
+    found = spectrum(lattice.endless, waves, start[:, None], polarisation, method)
+    axes = ("theta_i", "wavelength")
+    coordinates = {
+        "theta_i": ("theta_i", start, {"units": "rad"}),
+        "wavelength": ("wavelength", waves, {"units": "m"}),
+        "transmitted": (axes, found.transmittance, {"units": "1"}),
+    }
+    attributes: dict[str, Any] = {
+        "units": "1",
+        "long_name": "reflectance",
+        "method": method,
+        "polarisation": polarisation,
+    }
+    attributes |= believed([lattice], waves)
+    return array(found.reflectance, axes, coordinates, "reflectance", attributes)
+
+
+def believed(kinds: Sequence[Lattice], waves: FloatArray) -> dict[str, float | str]:
+    """What rays are worth on the smallest of some rods, at the longest of some wavelengths: attributes."""
+    return min((kind.validity(waves.max()) for kind in kinds), key=lambda v: v.size_parameter).attributes
 
 
 def _spoken(lattice: Lattice) -> dict[str, Any]:
@@ -82,7 +201,9 @@ def study(
     half_angle : float, radians
         Acceptance, see `goniometer.Cones`.
     method, max_bounces
-        See `goniometer.brdf`.
+        See `goniometer.brdf`; or "rods": the rigorous answer in the same unit, see `cluster`, for light
+        with its electric field along the rods. It has no use for half angle, rays and bounces, and does
+        not say where the power went (NaN). For endless rows, and as a multilayer, see `specular`.
     rays : int
         Across the lattice.
     min_amplitude : float
@@ -131,7 +252,8 @@ def study(
         share = np.stack([one[name] for one in done])
         coordinates[name] = ((*axes, *AXES[:2]), share.reshape(*shape, *share.shape[1:]), {"units": "1"})
     values = np.stack([one["brdf"] for one in done])
-    attributes = {"units": "sr-1", "long_name": "BRDF", "method": method, "half_angle_rad": half_angle} | {
+    attributes = {"units": "sr-1", "long_name": "BRDF", "method": method, "half_angle_rad": half_angle}
+    attributes |= believed(kinds, waves) | {
         f"lattice_{name}": int(value) if isinstance(value, bool) else value
         for name, value in _spoken(lattice).items()
         if name not in axes and value is not None
