@@ -101,6 +101,32 @@ def bouncing(make, side: int) -> dict:
     )
 
 
+def matter(side: int) -> dict:
+    """The same 12 bounces among mirrors, rods of glass (reflected light alone), and gold."""
+    scene, beam = scenes.rods()
+    mesh, beam = scene.surfaces[0].mesh, replace(beam, shape=(side, side))
+    glass = ft.Scene([ft.Surface(mesh, ft.Dielectric("reflected"), "glass", back=1.5)])
+    gold = ft.Scene([ft.Surface(mesh, ft.Metal(), "gold", back="gold")])
+    polarised = replace(beam, polarisation=(1.0, 1j))
+    paths = ft.trace(glass, beam, min_amplitude=0.0, record=True)
+    assert paths.ledger().error < 1e-12
+
+    def run(scene: ft.Scene, beam: ft.Beam):
+        return lambda: ft.trace(scene, beam, wavelength=600e-9, min_amplitude=0.0, threads=1)
+
+    return compare(
+        "matter",
+        glass,
+        paths,
+        {
+            "mirrors": run(scene, beam),
+            "glass, scalar": run(glass, beam),
+            "glass, polarised": run(glass, polarised),
+            "gold, polarised": run(gold, polarised),
+        },
+    )
+
+
 def interferogram(side: int) -> dict:
     """The Michelson, both arms, ray sum, one ray a pixel: trace and field."""
     bench = scenes.michelson(side)
@@ -200,7 +226,9 @@ def table(results: dict) -> str:
     rods, cube, michelson = (
         f"{one['1 thread: ratio to raw']:.2f} / {one['2 threads: ratio to raw']:.2f}" for one in traced
     )
-    count, memory = counted(traced[0]["rays"]), results["memory"]
+    count, memory, matter = counted(traced[0]["rays"]), results["memory"], results["matter"]
+    kinds = ("mirrors", "glass, scalar", "glass, polarised", "gold, polarised")
+    costs = " / ".join(f"{1.0 / matter[f'{kind}: ratio to raw']:.2f}" for kind in kinds)
     rows = [
         (f"`benchmarks/tracing.py`, {os.cpu_count()} cores", ""),
         ("---", "---"),
@@ -214,6 +242,11 @@ def table(results: dict) -> str:
             f"Michelson, both arms, {count} rays onto as many pixels, ray sum: beside raw embreex on all its "
             "segments",
             michelson,
+        ),
+        (
+            "cost of a bounce in that box, 1 thread, times raw embreex's: mirrors / glass (reflected light), "
+            "a number a ray / the field as a vector / gold",
+            costs,
         ),
         (
             "hits that float64 decides alone, in these three",
@@ -261,7 +294,7 @@ def main() -> None:
     parser.add_argument("--rays", type=float, default=1e6, help="rays in each timed scene")
     parser.add_argument("--stream", type=float, default=1e7, help="rays of the memory test")
     parser.add_argument("--json", type=Path, help="file to write the figures to")
-    parser.add_argument("--only", choices=["rods", "corner_cube", "michelson", "start", "memory"])
+    parser.add_argument("--only", choices=["rods", "corner_cube", "michelson", "matter", "start", "memory"])
     parser.add_argument("--write", action="store_true", help="put the figures into README.md and docs")
     parser.add_argument("--root", type=Path, default=ROOT, help="folder of the README that is written to")
     chosen = parser.parse_args()
@@ -272,6 +305,7 @@ def main() -> None:
         "rods": lambda: bouncing(scenes.rods, side),
         "corner_cube": lambda: bouncing(scenes.corner_cube, side),
         "michelson": lambda: interferogram(side),
+        "matter": lambda: matter(max(1, side // 2)),
         "start": start_up,
         "memory": lambda: memory(chosen.stream),
     }

@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import fringetrace as ft
 from fringetrace import instruments, mm, nm
-from fringetrace.bench import Bench, path_slope, pixel_centres
+from fringetrace.arms import path_slope
+from fringetrace.bench import Bench
 from fringetrace.quadrature import mutual_products
 from fringetrace.shapes import plate
 
@@ -140,25 +139,6 @@ def test_sampled_paths_are_few_and_recorded(bench):
     assert paths.ray.max() == 5
     assert paths.polyline(0).shape[1] == 3
     assert bench.derived == {}
-
-
-@settings(max_examples=30, deadline=None)
-@given(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05))
-def test_the_slope_of_a_tilted_wave_is_that_of_the_reflected_ray(tilt_x, tilt_y):
-    angle = math.hypot(tilt_x, tilt_y)
-    normal = np.array([0.0, 0.0, 1.0])
-    if angle > 0.0:
-        across = np.array([tilt_x, tilt_y]) / angle
-        normal = np.array([*(math.sin(angle) * across), math.cos(angle)])
-    down = np.array([0.0, 0.0, -1.0])
-    reflected = down - 2 * (down @ normal) * normal
-    np.testing.assert_allclose(path_slope((tilt_x, tilt_y)), reflected[:2], rtol=1e-12, atol=1e-17)
-
-
-def test_pixel_centres_lie_about_the_middle():
-    x, y = pixel_centres((2, 3), 0.5)
-    np.testing.assert_array_equal(x, [-0.5, 0.0, 0.5])
-    np.testing.assert_array_equal(y, [-0.25, 0.25])
 
 
 def test_a_bench_can_be_built_from_any_scene(bench):

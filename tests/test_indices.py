@@ -72,3 +72,9 @@ def test_n_and_kappa_apart():
     n, kappa = m.GOLD.n, Formula("exponential", (1.0, 1.0), (10.0, 20.0))
     with pytest.raises(ValueError, match="x: expected n and kappa over common wavelengths, got"):
         m.Material("x", n, kappa)
+
+
+def test_materials_of_one_index_are_equal_whatever_their_name():
+    assert m.constant(1.0) == m.constant(1.0, "vacuum")
+    assert hash(m.constant(1.0)) == hash(m.constant(1.0, "vacuum"))
+    assert m.constant(1.0) != m.constant(1.0 + 1e-9)

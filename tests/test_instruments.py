@@ -1,6 +1,7 @@
 """The Michelson's layout: which ray lands where, what it is made of, and every refusal."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -149,3 +150,140 @@ def test_what_does_not_fit_is_refused(options, message):
 def test_a_sample_that_is_no_mesh_is_refused():
     with pytest.raises(TypeError, match="expected a mesh with vertices and faces, got str"):
         michelson(sample="step.stl")
+
+
+GLASS = ft.Surface(plate(8 * mm, 8 * mm), ft.Dielectric(), "glass", back=1.5)
+SLAB = plate(2 * mm, 2 * mm, 1 * mm)
+
+
+@pytest.mark.parametrize(
+    ("bench", "options", "message"),
+    [
+        (
+            "michelson",
+            {"compensator": True},
+            "michelson compensator: expected one beside a SplitterPlate only",
+        ),
+        (
+            "michelson",
+            {"splitter": instruments.SplitterPlate(1 * mm), "arm": 20 * mm},
+            "michelson arm: expected at least 4.0 times the aperture, 0.024 m, got 0.02",
+        ),
+        ("fizeau", {"gap": 0.0}, "fizeau gap: expected more than the sample's height, 0 m, and a plate of"),
+        ("fizeau", {"gap": 1 * mm, "thickness": 0.0}, "fizeau gap: expected more than the sample's height"),
+        ("fizeau", {"gap": math.inf}, "fizeau gap: expected more than the sample's height"),
+        ("fizeau", {"gap": 1 * mm, "radius": 5 * mm}, "fizeau radius: expected over 0.00848528 m, got 0.005"),
+        (
+            "fizeau",
+            {"gap": 1 * mm, "reference_tilt": (0.2, 0.0)},
+            "fizeau reference_tilt: expected up to 0.1",
+        ),
+        ("fizeau", {"gap": 1 * mm, "rays": 1.5}, "fizeau rays: expected a positive whole number"),
+        ("mach_zehnder", {}, "mach_zehnder index: expected that of what the mesh is filled with, got None"),
+        (
+            "mach_zehnder",
+            {"sample": GLASS, "index": 1.5},
+            "mach_zehnder index: expected None beside surfaces",
+        ),
+        (
+            "mach_zehnder",
+            {"sample": GLASS, "na": 0.7},
+            "mach_zehnder na: expected a number up to 0.6247, got 0.7",
+        ),
+        (
+            "mach_zehnder",
+            {"sample": GLASS, "na": 0.0},
+            "mach_zehnder na: expected a number up to 0.6247, got 0",
+        ),
+        ("mach_zehnder", {"sample": GLASS, "aperture": -1.0}, "mach_zehnder aperture: expected a positive"),
+        (
+            "mach_zehnder",
+            {"sample": GLASS, "reference_tilt": (0, 1)},
+            "mach_zehnder reference_tilt: expected",
+        ),
+        ("jamin_lebedeff", {"index": 1.5, "shear": 1 * mm}, "jamin_lebedeff shear: expected at least"),
+        (
+            "jamin_lebedeff",
+            {"index": 1.5, "crystal": (1.5, 1.5)},
+            "jamin_lebedeff crystal: expected two diff",
+        ),
+        (
+            "jamin_lebedeff",
+            {"index": 1.5, "pixels": (0, 4)},
+            "jamin_lebedeff pixels: expected positive whole",
+        ),
+    ],
+)
+def test_what_does_not_fit_other_benches_is_refused(bench, options, message):
+    options = {"sample": SLAB if bench[0] in "mj" else plate(8 * mm, 8 * mm), "aperture": APERTURE, **options}
+    with pytest.raises(ValueError, match=message):
+        getattr(instruments, bench)(options.pop("sample"), **options)
+
+
+@pytest.mark.parametrize("bench", ["mach_zehnder", "jamin_lebedeff"])
+def test_a_profile_is_given_over_the_image_of_every_bench(bench):
+    """Light only where x > 0 and y < 0."""
+    slab = plate(8 * mm, 8 * mm, 1 * mm).moved((0.0, 0.0, 0.5 * mm))
+    instrument = getattr(instruments, bench)(
+        slab, index=1.0, aperture=APERTURE, pixels=(6, 8),
+        profile=lambda x, y: np.where((x > 0) & (y < 0), 1.0, 0.0),
+    )  # fmt: skip
+    expected = np.zeros((6, 8))
+    expected[:3, 4:] = 1.0
+    np.testing.assert_allclose(instrument.interferogram(HENE), expected, atol=1e-9)
+
+
+def test_the_fizeau_shows_a_step_where_it_stands():
+    """Brighter and darker halves, by the sample's x; the profile too."""
+    step = ft.shapes.step(8 * mm, 8 * mm, 1 * mm, 100 * nm)
+    bench = instruments.fizeau(
+        step, aperture=APERTURE, gap=1 * mm, pixels=(6, 12), max_bounces=9,
+        profile=lambda x, y: np.where(y < 0, 1.0, 0.0),
+    )  # fmt: skip
+    image = bench.interferogram(HENE)
+    np.testing.assert_allclose(image[3:], 0.0, atol=1e-9)
+    assert np.ptp(image[:3, :7]) < 1e-6 < abs(image[0, 0] - image[0, 11])
+    np.testing.assert_allclose(image[:3, 9:], image[0, 11], atol=1e-6)
+
+
+def test_a_polarised_bench_has_fields_of_three_components():
+    scalar, polarised = (
+        instruments.mach_zehnder(
+            plate(8 * mm, 8 * mm, 1 * mm), index=1.0, aperture=APERTURE, pixels=(3, 4),
+            reference_tilt=(2e-5, 0.0), polarisation=jones,
+        )
+        for jones in (None, (0.6, 0.8j))
+    )  # fmt: skip
+    fields = polarised.fields(HENE)
+    assert fields.shape == (2, 3, 3, 4)
+    # columns, rows, normal: light in both arms comes with the state that it was given
+    np.testing.assert_allclose(np.abs(fields[0, :, 1, 1]), [0.3, 0.4, 0.0], atol=1e-12)
+    np.testing.assert_allclose((fields[0, 1] / fields[0, 0]).imag, 4 / 3, rtol=1e-9)
+    np.testing.assert_allclose(polarised.interferogram(HENE), scalar.interferogram(HENE), atol=1e-9)
+    assert polarised.field(HENE).shape == (3, 3, 4)
+    rays = replace(polarised, method="rays")
+    np.testing.assert_allclose(rays.stream_fields(HENE), rays.fields(HENE), rtol=0, atol=1e-12)
+
+
+def test_a_bench_that_depends_on_the_wavelength_is_traced_once_for_each():
+    bent = plate(8 * mm, 8 * mm, 1 * mm).moved(turn=ft.vectors.rotation((0, 1, 0), 0.1))
+    straight, tilted = (
+        instruments.mach_zehnder(slab, index="BK7", aperture=APERTURE, pixels=(3, 4))
+        for slab in (plate(8 * mm, 8 * mm, 1 * mm), bent)
+    )
+    with pytest.raises(ValueError, match="trace wavelength: expected one, since BK7 is dispersive, got None"):
+        straight.trace()
+    for wavelength in (HENE, 500 * nm, HENE):
+        straight.interferogram(wavelength)
+        tilted.interferogram(wavelength)
+    # straight on no wavelength goes another way: one trace for all; what is bent is traced again
+    assert straight.traced == (HENE,)
+    assert tilted.traced == (HENE, 500 * nm, HENE)
+    assert tilted.trace() is tilted.trace(HENE)
+    again = instruments.mach_zehnder(
+        plate(8 * mm, 8 * mm, 1 * mm), index="BK7", aperture=APERTURE, pixels=(3, 4)
+    )
+    np.testing.assert_allclose(
+        straight.interferogram(500 * nm), again.interferogram(500 * nm), rtol=0, atol=1e-6
+    )
+    assert instruments.michelson(plate(8 * mm, 8 * mm), aperture=APERTURE, pixels=(2, 2)).traced == ()

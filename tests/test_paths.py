@@ -6,7 +6,8 @@ from columns import BARE
 
 import fringetrace as ft
 from fringetrace import Fate, shapes
-from fringetrace.paths import join, pixels, project
+from fringetrace.landing import project
+from fringetrace.paths import join, pixels
 
 LEDGER = 1e-12
 ROUNDING = 1e-14

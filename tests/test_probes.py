@@ -83,3 +83,16 @@ def test_a_flat_form_is_a_facet():
     assert (flat == 0).all()
     assert (formed < 0).all()
     assert len(np.unique(formed)) == 1
+
+
+def test_waves_beside_media_that_absorb_are_not_plane():
+    """Each facet stays a part of its own; on metals, and on glass, facets are planes."""
+    box = shapes.plate(1.0, 1.0, 0.5)
+    smoke = ft.Scene([ft.Surface(box, ft.Dielectric(), "smoke", back=1.5 + 1e-6j)])
+    clear = ft.Scene([ft.Surface(box, ft.Dielectric(), "glass", back=1.5)])
+    gold = ft.Scene([ft.Surface(box, ft.Metal(), "gold", back="gold")])
+    murk = ft.Scene([ft.Surface(box, ft.Mirror(), "mirror")], medium=1.3 + 1e-9j)
+    for scene, plane in ((smoke, False), (clear, True), (gold, True), (murk, False)):
+        (parts,) = probes.parted(scene)
+        assert len(np.unique(parts)) == 6
+        assert (parts >= 0).all() if plane else (parts < 0).all()

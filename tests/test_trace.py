@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import fringetrace as ft
 from fringetrace import Fate, shapes
-from fringetrace.paths import project
+from fringetrace.landing import project
 from fringetrace.vectors import rotation
 
 # A dozen roundings: a path is a sum of a few segments.

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
         gratings,
         instruments,
         lattices,
+        lenses,
         materials,
         meshes,
         phase,
@@ -85,6 +86,7 @@ __all__ = [
     "instruments",
     "irradiance",
     "lattices",
+    "lenses",
     "materials",
     "meshes",
     "mm",
@@ -110,7 +112,7 @@ __all__ = [
 # rooms that are imported at first use
 _ROOMS = (
     "bsdf", "crystals", "cylinders", "elements", "films", "forms", "goniometer", "gratings",
-    "instruments", "lattices", "materials", "meshes", "phase", "plates", "polarisers", "shapes",
+    "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers", "shapes",
     "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
 )  # fmt: skip
 

@@ -301,7 +301,7 @@ def _console() -> Console:
 
 
 def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength: float) -> None:
-    from fringetrace.bench import path_slope
+    from fringetrace.arms import path_slope
 
     rows, columns = bench.ccd.shape
     width, height = bench.ccd.size

@@ -15,7 +15,7 @@ from fringetrace.patches import Patches
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import Beam, Surface
 from fringetrace.vectors import unit
-from fringetrace.waves import Array, FloatArray
+from fringetrace.waves import Array, ComplexArray, FloatArray
 
 # What tells roundings of float64 has more digits, where the machine has such numbers.
 EXTENDED = np.longdouble
@@ -109,27 +109,50 @@ def indices(paths: Paths) -> FloatArray:
     Returns
     -------
     (m, b + 1) float64
-        Before each bounce, and behind the last.
+        Before each bounce, and behind the last; that of the wave, |Re k| / k0, where it fades aslant.
     """
     assert paths.points is not None
-    index = np.ones((len(paths), paths.points.shape[1] - 1))
+    shape = len(paths), paths.points.shape[1] - 1
     if paths.medium is None:
-        return index
-    known = {m: complex(m.index(paths.wavelength or 1.0)).real for m in materials(paths.scene)}
+        return np.ones(shape)
+    known = {m: complex(m.index(paths.wavelength or 1.0)) for m in materials(paths.scene)}
     direction = np.asarray(legs(paths)[1], dtype=np.float64)
-    index[:] = np.nan
-    index[:, 0] = known[paths.scene.around]
+    medium, normal = np.full(shape, np.nan, dtype=np.complex128), np.zeros((*shape, 3))
+    medium[:, 0] = known[paths.scene.around]
     for bounces in met(paths):
-        surface = bounces.surface
+        surface, at = bounces.surface, (bounces.path, bounces.bounce + 1)
+        normal[at] = normals(bounces)
         if not surface.boundary:
             continue
-        onward = direction[bounces.path, bounces.bounce + 1]
-        front = np.einsum("ni,ni->n", facing(bounces), onward) > 0.0
+        front = np.einsum("ni,ni->n", facing(bounces), direction[at]) > 0.0
         before, behind = (known[side or paths.scene.around] for side in (surface.front, surface.back))
-        index[bounces.path, bounces.bounce + 1] = np.where(front, before, behind)
+        medium[at] = np.where(front, before, behind)
     # as it was, where no boundary changed it
-    latest = np.maximum.accumulate(np.where(np.isnan(index), 0, np.arange(index.shape[1])), axis=1)
-    return np.take_along_axis(index, latest, axis=1)
+    latest = np.maximum.accumulate(np.where(np.isnan(medium), 0, np.arange(shape[1])), axis=1)
+    medium = np.take_along_axis(medium, latest, axis=1)
+    return _slanting(medium, normal, direction) if medium.imag.any() else medium.real
+
+
+def _slanting(medium: ComplexArray, normal: FloatArray, direction: FloatArray) -> FloatArray:
+    """|Re k| / k0 on each segment, in media that may absorb; see `refractions`.
+
+    `medium` (m, b + 1) are their indices, `normal` (m, b + 1, 3) those of the surfaces met before.
+    """
+    index = medium.real.copy()
+    fade = medium[:, 0].imag[:, None] * direction[:, 0]
+    for k in range(1, index.shape[1]):
+        n, first, last = normal[:, k], medium[:, k - 1], medium[:, k]
+        into, out = dot(n, direction[:, k - 1]), dot(n, direction[:, k])
+        sense, along = np.sign(into), dot(n, fade)
+        before = index[:, k - 1] * np.abs(into) + 1j * sense * along
+        behind = np.sqrt((last - first) * (last + first) + before**2)
+        behind = np.where(behind.real + behind.imag < 0.0, -behind, behind)
+        back = into * out < 0.0
+        deeper = sense * (behind - before) * (first != last)
+        wave = index[:, k - 1, None] * direction[:, k - 1] + deeper.real[:, None] * n
+        index[:, k] = np.where(back, index[:, k - 1], np.sqrt(dot(wave, wave)))
+        fade = fade + np.where(back, -2.0 * along, deeper.imag)[:, None] * n
+    return index
 
 
 def facing(bounces: Met) -> FloatArray:

@@ -106,6 +106,12 @@ class LevelFit:
     complete: bool
     size: float
 
+    def guess(self, origin: FloatArray, direction: FloatArray, side: FloatArray) -> FloatArray:
+        """Way (n,) in metres along rays to a quadric, one step from `origin`; NaN or nonsense if none."""
+        with np.errstate(all="ignore"):
+            value, gradient, bend = self.form.level(origin, direction)
+            return advance(value, dot(gradient, direction), bend, side)
+
     def meet(
         self, origin: FloatArray, direction: FloatArray, path: FloatArray, side: FloatArray, face: Array
     ) -> Meeting:

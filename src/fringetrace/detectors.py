@@ -14,7 +14,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.paths import Fate, Paths, project
+from fringetrace.landing import project
+from fringetrace.paths import Fate, Paths
 from fringetrace.scene import CCD
 from fringetrace.waves import Array, FloatArray
 

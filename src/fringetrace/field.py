@@ -8,8 +8,9 @@ from itertools import chain, groupby
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.landing import along
 from fringetrace.media import at_wavelength
-from fringetrace.paths import Paths, along, join, screen
+from fringetrace.paths import Paths, join, screen
 from fringetrace.scene import Beam
 from fringetrace.waves import ComplexArray, FloatArray, checked_wavelength
 

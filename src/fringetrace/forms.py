@@ -13,10 +13,13 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.crossings import Fit, dot, fit_level
+from fringetrace.crossings import EPSILON, Fit, dot, fit_level
 from fringetrace.patches import patched, vertex_normals
 from fringetrace.vectors import checked_direction, checked_rotation, checked_vector, component, unit
 from fringetrace.waves import FloatArray
+
+# Past its equator by no more than this, in radii squared, a conic is at it.
+EQUATOR = 4.0 * EPSILON
 
 
 class Form(Protocol):
@@ -161,6 +164,27 @@ class Conic:
                 f"Conic: expected a finite conic constant and terms, got {self.conic!r} and {self.terms!r}"
             )
 
+    def sag(self, square: FloatArray) -> FloatArray:
+        """Height of the surface over its vertex plane.
+
+        Parameters
+        ----------
+        square : float64, any shape, m^2
+            Distance from the axis, squared.
+
+        Returns
+        -------
+        float64, same shape, metres
+            NaN beyond the equator.
+        """
+        square, c = np.asarray(square, dtype=np.float64), 1.0 / self.radius
+        under = 1.0 - (1.0 + self.conic) * c * c * square
+        root = np.sqrt(np.where(under > -EQUATOR, np.maximum(under, 0.0), np.nan))
+        height = c * square / (1.0 + root)
+        for i, a in enumerate(self.terms):
+            height = height + a * square ** (i + 2)
+        return np.asarray(height, dtype=np.float64)
+
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Height above the surface; z - (c r^2 + c (1 + k) z^2) / 2 without terms. See `Level`."""
         c, k = 1.0 / self.radius, self.conic
@@ -174,14 +198,13 @@ class Conic:
             gradient = np.outer(1.0 - (1.0 + k) * c * z, self.axis) - c * across
             return value, gradient, -c * (dot(aside, aside) + (1.0 + k) * dz * dz)
         root = np.sqrt(1.0 - (1.0 + k) * c * c * square)
-        sag, first, second = c * square / (1.0 + root), 0.5 * c / root, 0.25 * (1.0 + k) * c**3 / root**3
+        first, second = 0.5 * c / root, 0.25 * (1.0 + k) * c**3 / root**3
         for i, a in enumerate(self.terms):
             power = i + 2
-            sag = sag + a * square**power
             first = first + a * power * square ** (power - 1)
             second = second + a * power * (power - 1) * square ** (power - 2)
         bend = -2.0 * first * dot(aside, aside) - 4.0 * second * dot(across, aside) ** 2
-        return z - sag, self.axis - 2.0 * first[:, None] * across, bend
+        return z - self.sag(square), self.axis - 2.0 * first[:, None] * across, bend
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
         """The conic on a mesh; see `Form`."""

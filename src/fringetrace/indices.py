@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -21,7 +21,7 @@ SLACK = 1e-12
 
 @dataclass(frozen=True)
 class Material:
-    """A refractive index with a name.
+    """A refractive index with a name; two of the same index are equal, whatever they are called.
 
     Parameters
     ----------
@@ -39,10 +39,10 @@ class Material:
         If n and kappa are known at no common wavelength.
     """
 
-    name: str
+    name: str = field(compare=False)
     n: Curve
     kappa: Curve | None = None
-    source: str = ""
+    source: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:
         if self.range is not None and self.range[0] > self.range[1]:

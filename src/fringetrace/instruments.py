@@ -1,32 +1,41 @@
-"""Ready benches."""
+"""Ready benches: the Michelson, and the others by name."""
 
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 
+from fringetrace import layouts
 from fringetrace.bench import Bench
+from fringetrace.fizeau import fizeau
 from fringetrace.interfaces import BeamSplitter, Interface, Mirror
+from fringetrace.jamin import jamin_lebedeff
+from fringetrace.layouts import TILT
 from fringetrace.mesh import Mesh
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
 from fringetrace.shapes import plate
+from fringetrace.splitters import SplitterPlate, anti_reflecting, semi_reflecting
 from fringetrace.vectors import rotation
 from fringetrace.waves import FloatArray
+from fringetrace.zehnder import mach_zehnder
 
-__all__ = ["Bench", "michelson"]
+__all__ = [
+    "TILT", "Bench", "SplitterPlate", "anti_reflecting", "fizeau", "jamin_lebedeff", "mach_zehnder",
+    "michelson", "semi_reflecting",
+]  # fmt: skip
 
 # Parts of the arm: the splitter reaches SPAN up, down and to the sides; an arm is SHORTEST apertures and
-# TALLEST heights of the sample long, or longer. A reference mirror tilted by up to TILT (radians) and
+# TALLEST heights of the sample long, or longer. A reference mirror tilted by up to TILT and
 # moved by up to PISTON arms then sends all of its light back through the splitter, and touches nothing.
 SPAN = 0.6
 SHORTEST = 2.0
 TALLEST = 3.0
-TILT = 0.1
 PISTON = 0.1
-# Rays along either axis at least: what differences of fourth order need.
-LEAST = 5
+# With a real splitter an arm has room for plates, at least so many apertures and thicknesses; half way to the
+# reference stands the compensator, which reaches half a beam and WIDER arms to all sides.
+ROOMIER = 4.0
+WIDER = 0.1
 
 
 def michelson(
@@ -39,7 +48,8 @@ def michelson(
     rays: float = 1,
     profile: Profile | None = None,
     arm: float | None = None,
-    splitter: Interface = BeamSplitter(),  # noqa: B008 - frozen
+    splitter: Interface | SplitterPlate = BeamSplitter(),  # noqa: B008 - frozen
+    compensator: bool = False,
     mirror: Interface = Mirror(),  # noqa: B008 - frozen
     focus: bool = True,
     method: str = "auto",
@@ -70,9 +80,13 @@ def michelson(
         Amplitude of the beam at (x, y) of the image, metres; None is uniform. See `Gaussian`.
     arm : float, metres, optional
         Length of the arms; default twice the larger side of the image, three times the height of
-        the sample if that is more.
-    splitter, mirror : Interface
-        Of the splitter and of the reference mirror.
+        the sample if that is more; with a plate four times that side, or its thickness.
+    splitter : Interface or SplitterPlate
+        A thin splitter, or a real plate: then one has to say at which wavelength it is traced.
+    compensator : bool
+        A second plate of glass, in the arm of the reference.
+    mirror : Interface
+        Of the reference mirror.
     focus : bool
         The CCD sees the plane z = 0 of the sample through an ideal 1:1 relay; False: bare CCD.
     method : {"auto", "wavefront", "rays"}
@@ -86,29 +100,42 @@ def michelson(
     ------
     ValueError
         If a length, a number of pixels or of rays is not positive; if the arm is too short for
-        the aperture or the sample; if the tilt would lead the reference beam off the bench.
+        the aperture or the sample; if the tilt would lead the reference beam off the bench; for a
+        compensator without a plate.
     TypeError
         If the sample is no mesh.
     """
     surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
-    size, arm = _layout(aperture, pixels, rays, arm, float(surface.mesh.bounds[1, 2]))
+    thick = splitter if isinstance(splitter, SplitterPlate) else None
+    size = layouts.checked_image("michelson", aperture, pixels, rays)
+    arm = _arm(size, arm, float(surface.mesh.bounds[1, 2]), thick)
     _check_reference(reference_tilt, piston, arm)
+    if compensator and thick is None:
+        raise ValueError(f"michelson compensator: expected one beside a SplitterPlate only, got {splitter!r}")
     half, (rows, columns) = SPAN * arm, pixels
     crossing = plate(2.0 * half * math.sqrt(2.0), 2.0 * half)
     facing = plate(half, half).moved(turn=_reference_turn(reference_tilt))
     x, y, z = np.eye(3)
+    rise, aside = (0.0, 0.0) if thick is None else thick.offsets()
+    glass: tuple[Surface, ...] = ()
+    if thick is None:
+        first = Surface(crossing.moved(turn=rotation(y, math.pi / 4.0)), splitter, "splitter")  # type: ignore[arg-type]
+    else:
+        first, *others = thick.surfaces(half)
+        glass = tuple(others)
+        if compensator:
+            glass += thick.compensator(0.5 * max(size) + WIDER * arm, 0.5 * arm * x)
     scene = Scene(
         (
-            Surface(crossing.moved(turn=rotation(y, math.pi / 4.0)), splitter, "splitter"),
-            surface.moved(-arm * z),
+            first,
+            surface.moved(aside * x - arm * z),
             Surface(facing.moved((arm + piston) * x), mirror, "reference"),
+            *glass,
         )
     )
-    least = 1 if rays >= 1 else LEAST
-    shape = max(least, round(rows * rays)), max(least, round(columns * rays))
     beam = Beam(
-        centre=-arm * x, direction=x, up=y, size=size, shape=shape,
-        profile=None if profile is None else partial(_seen, profile),
+        centre=rise * z - arm * x, direction=x, up=y, size=size, shape=layouts.ray_grid(pixels, rays),
+        profile=layouts.seen(profile),
     )  # fmt: skip
     ccd = CCD(
         centre=arm * z, normal=-z, up=y, pitch=aperture / columns, shape=(rows, columns),
@@ -117,21 +144,15 @@ def michelson(
     return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt, method=method)
 
 
-def _layout(
-    aperture: float, pixels: tuple[int, int], rays: float, arm: float | None, top: float
-) -> tuple[tuple[float, float], float]:
-    """Width and height of the beam and the length of the arms, once they are known to fit."""
-    if not (math.isfinite(aperture) and aperture > 0.0):
-        raise ValueError(f"michelson aperture: expected a positive length in metres, got {aperture!r}")
-    if len(pixels) != 2 or not all(isinstance(n, (int, np.integer)) and n > 0 for n in pixels):
-        raise ValueError(f"michelson pixels: expected positive whole (rows, columns), got {pixels!r}")
-    if not (0.0 < rays < 1.0 or (rays >= 1 and float(rays).is_integer())):
-        raise ValueError(f"michelson rays: expected a positive whole number, or a part of 1, got {rays!r}")
-    size = (aperture, aperture * pixels[0] / pixels[1])
-    arm = max(SHORTEST * max(size), TALLEST * top) if arm is None else arm
-    if not (math.isfinite(arm) and arm >= SHORTEST * max(size)):
+def _arm(size: tuple[float, float], arm: float | None, top: float, thick: SplitterPlate | None) -> float:
+    """The length of the arms, once all is known to fit."""
+    shortest = SHORTEST * max(size)
+    if thick is not None:
+        shortest = ROOMIER * max(*size, thick.thickness)
+    arm = max(shortest, TALLEST * top) if arm is None else arm
+    if not (math.isfinite(arm) and arm >= shortest):
         raise ValueError(
-            f"michelson arm: expected at least {SHORTEST} times the aperture, {SHORTEST * max(size):g} m, "
+            f"michelson arm: expected at least {shortest / max(size)} times the aperture, {shortest:g} m, "
             f"got {arm!r}"
         )
     if not arm >= TALLEST * top:
@@ -139,7 +160,7 @@ def _layout(
             f"michelson arm: expected at least {TALLEST} times the sample's height, {TALLEST * top:g} m, "
             f"got {arm!r}; z = 0 is the plane that the camera sees"
         )
-    return size, arm
+    return arm
 
 
 def _check_reference(tilt: tuple[float, float], piston: float, arm: float) -> None:
@@ -163,8 +184,3 @@ def _reference_turn(tilt: tuple[float, float]) -> FloatArray:
     if angle == 0.0:
         return facing
     return np.asarray(rotation((0.0, -tilt[0], -tilt[1]), angle) @ facing, dtype=np.float64)
-
-
-def _seen(profile: Profile, x: FloatArray, y: FloatArray) -> FloatArray:
-    """A profile over the image as one over the beam: the splitter turns the beam's x into -x."""
-    return profile(-x, y)

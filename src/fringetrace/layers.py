@@ -1,4 +1,4 @@
-"""Compiled loops of thin films: amplitudes of stacks of layers by their characteristic matrices."""
+"""Compiled loops of bare faces, and of thin films by their characteristic matrices: amplitudes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import cmath
 
 import numpy as np
 
-from fringetrace.exact import jit
+from fringetrace.exact import jit, part
 
 
 @jit
@@ -106,3 +106,84 @@ def shares(sine2, first, last):
     for i in range(len(sine2)):
         out[0, i], out[1, i] = carried(sine2[i], first[i], last[i])
     return out
+
+
+@part
+def forward(squared):
+    """Normal part of a wave vector from its square: the root that runs, or fades, forwards."""
+    root = np.sqrt(squared)
+    return -root if root.real + root.imag < 0.0 else root
+
+
+@part
+def flow(index, normal):
+    """Power through a boundary of s and of p light of unit amplitude: n cos, but in an absorbing medium."""
+    return normal.real, (index * (normal / index).conjugate()).real
+
+
+@part
+def shared(through, before):
+    """From amplitudes of E to those of power; nothing goes on where no power flows."""
+    return np.sqrt(through / before) if through > 0.0 and before > 0.0 else 0.0
+
+
+@part
+def fresnel(first, q1, last, q2):
+    """Fresnel's r_s, r_p, t_s, t_p, of E, from indices and normal parts n cos; signs as in `films`."""
+    a, b = last * last * q1, first * first * q2
+    s, p = 1.0 / (q1 + q2), 1.0 / (a + b)
+    return (q1 - q2) * s, (a - b) * p, 2.0 * q1 * s, 2.0 * first * last * q1 * p
+
+
+@part
+def clear(first, last, q):
+    """`bare` between media that do not absorb, from the real normal part before: real, but for phases."""
+    square = (last - first) * (last + first) + q * q
+    deep = np.sqrt(abs(square))
+    a, b = last * last * q, first * first * deep
+    if square >= 0.0:
+        s, p, root = 1.0 / (q + deep), 1.0 / (a + b), 2.0 * np.sqrt(q * deep)
+        ts, tp = root * s, first * last * root * p
+        return complex((q - deep) * s), complex((a - b) * p), complex(ts), complex(tp), complex(deep)
+    s, p = 1.0 / (q * q + deep * deep), 1.0 / (a * a + b * b)
+    rs = complex((q - deep) * (q + deep) * s, -2.0 * q * deep * s)
+    rp = complex((a - b) * (a + b) * p, -2.0 * a * b * p)
+    return rs, rp, 0j, 0j, complex(0.0, deep)
+
+
+@part
+def bare(first, last, q1):
+    """Amplitudes of power of a bare boundary, r_s, r_p, t_s, t_p, and the normal part behind."""
+    if first.imag == 0.0 and last.imag == 0.0 and q1.imag == 0.0 and q1.real > 0.0 and first != last:
+        return clear(first.real, last.real, q1.real)
+    q2 = beneath(first, last, q1)
+    rs, rp, ts, tp = fresnel(first, q1, last, q2)
+    s, p = powers(first, q1, last, q2)
+    return rs, rp, ts * s, tp * p, q2
+
+
+@part
+def beneath(first, last, q1):
+    """Normal part of the wave vector behind a boundary."""
+    return q1 if first == last else forward((last - first) * (last + first) + q1 * q1)
+
+
+@part
+def powers(first, q1, last, q2):
+    """From amplitudes of E behind a boundary to those of power, of s and of p light."""
+    s, p = flow(first, q1)
+    through_s, through_p = flow(last, q2)
+    return shared(through_s, s), shared(through_p, p)
+
+
+@jit
+def coated(film, surface, front, first, last, q1, k0):
+    """`bare` of a boundary with a film on it, met from the front or from the back."""
+    q2 = beneath(first, last, q1)
+    begin, indices, thickness, backwards = film
+    a, b = begin[surface], begin[surface + 1]
+    layers = indices[a:b] if front else backwards[0][a:b]
+    depth = thickness[a:b] if front else backwards[1][a:b]
+    rs, rp, ts, tp = stack(first * first - q1 * q1, first, layers, depth, last, k0)
+    s, p = powers(first, q1, last, q2)
+    return rs, rp, ts * s, tp * p, q2

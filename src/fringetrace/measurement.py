@@ -17,7 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace import tables
-from fringetrace.bench import Bench, path_slope, pixel_centres
+from fringetrace.arms import path_slope, pixel_centres
+from fringetrace.bench import Bench
 from fringetrace.field import chosen
 from fringetrace.mesh import Mesh
 from fringetrace.meshes import interpolate_height
@@ -162,7 +163,7 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
     Measurement
     """
     # a pixel that is averaged shows a mean of both sides of a step
-    averaged = chosen(bench.trace(), bench.method) == "wavefront"
+    averaged = chosen(bench.trace(wavelength), bench.method) == "wavefront"
     bend = STEP * wavelength if averaged else math.inf
     frames, height = bench.phase_steps(wavelength, steps), bench.height(wavelength, steps)
     both = np.isfinite(height) & np.isfinite(truth)
@@ -177,7 +178,7 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
         truth=truth,
         residual=residual - _piston(residual[both], wavelength),
         smooth=_smooth(truth, 0.25 * wavelength, bend),
-        ledger=bench.trace().ledger(),
+        ledger=bench.trace(wavelength).ledger(),
     )
 
 

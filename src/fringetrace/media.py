@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 CONSTANT, BOUNDARY = 0, 1
 REFLECTED, TRANSMITTED, OPAQUE = 1, 2, 4
 FOLLOW = {"both": REFLECTED | TRANSMITTED, "reflected": REFLECTED, "transmitted": TRANSMITTED}
-# Incidence (sin^2) up to which a boundary is met straight on, so that no wavelength is bent by it.
-STRAIGHT = 1e-20
+# Beyond, float64 keeps nothing of the squares of other indices beside them.
+INDICES = 1e-7, 1e7
+# Incidence (sin^2, rounded) up to which a boundary is met straight on, so that no wavelength is bent by it.
+STRAIGHT = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,8 +162,8 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
     Raises
     ------
     ValueError
-        If the wavelength is missing, is none, or lies outside the range of a material; if an element
-        needs light of a polarisation that has none.
+        If the wavelength is missing, is none, or lies outside the range of a material; if an index is
+        beyond `INDICES`; if an element needs light of a polarisation that has none.
     """
     if wavelength is not None:
         wavelength = checked_wavelength(wavelength)
@@ -187,7 +189,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         transmission=transmission,
         front=table[:, 0].copy(),
         back=table[:, 1].copy(),
-        media=np.array([complex(medium.index(at)) for medium in known]),
+        media=np.array([_index(medium, at) for medium in known]),
         follow=np.array([_followed(surface) for surface in scene.surfaces], dtype=np.int8),
         film=_layers(scene, at),
         k0=0.0 if wavelength is None else 2.0 * math.pi / wavelength,
@@ -195,6 +197,14 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         polarised=polarised,
         elements=elements,
     )
+
+
+def _index(medium: Material, wavelength: float) -> complex:
+    """Index of a medium that the kernels can do with."""
+    index, (least, most) = complex(medium.index(wavelength)), INDICES
+    if not least <= abs(index) <= most:
+        raise ValueError(f"{medium.name}: expected an index of magnitude {least:g} to {most:g}, got {index}")
+    return index
 
 
 def thin(scene: Scene) -> dict[int, Element]:
@@ -249,7 +259,7 @@ def _layers(scene: Scene, wavelength: float) -> tuple[Array, ComplexArray, Array
 
     def table(some: list[tuple[tuple[Material, float], ...]]) -> tuple[ComplexArray, Array]:
         layers = [layer for film in some for layer in film]
-        index = np.array([complex(medium.index(wavelength)) for medium, _ in layers], dtype=np.complex128)
+        index = np.array([_index(medium, wavelength) for medium, _ in layers], dtype=np.complex128)
         return index, np.array([thickness for _, thickness in layers], dtype=np.float64)
 
     return begin, *table(films), table([film[::-1] for film in films])
@@ -273,14 +283,21 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
     Raises
     ------
     ValueError
-        If the other wavelength goes another way.
+        If the other wavelength goes another way, or media contradict.
     """
     wavelength = checked_wavelength(wavelength)
     if paths.wavelength is None or paths.wavelength == wavelength or paths.lengths is None:
         return paths
     assert paths.bend is not None
     why, seen = needs(paths.scene), paths.fate == Fate.DETECTED
-    if why is not None and (paths.bend[seen] > STRAIGHT).any():
+    if why is None:
+        return replace(paths, wavelength=wavelength)
+    if paths.contradictions is not None and paths.contradictions.any():
+        raise ValueError(
+            f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since rays came to surfaces "
+            f"in media that these do not have there, got {wavelength:.6g} m: trace once a wavelength"
+        )
+    if (paths.bend[seen] > STRAIGHT).any():
         raise ValueError(
             f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since {why} and "
             f"light is bent, got {wavelength:.6g} m: trace once a wavelength"
@@ -292,7 +309,7 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
     return replace(
         paths,
         length=paths.length + paths.lengths @ (new.real - old.real),
-        amplitude=paths.amplitude * factor,
+        amplitude=paths.amplitude * (factor if paths.field is None else np.abs(factor)),
         field=None if paths.field is None else paths.field * factor[:, None],
         index=None if paths.medium is None else new.real[paths.medium],
         wavelength=wavelength,
@@ -325,6 +342,11 @@ def _straight_on(
     front, back = surface.front or around, surface.back or around
     assert isinstance(surface.interface, (Dielectric, Metal))
     film = surface.interface.film
+    if film is not None and front == back and film != film.reversed():
+        raise ValueError(
+            f"wavelength: expected that of the trace, since {surface.name} has a film that is not the same "
+            f"from behind, between equal media, got {wavelength:.6g} m: trace once a wavelength"
+        )
     if medium != front and film is not None:
         film = film.reversed()
     beyond = back if medium == front else front

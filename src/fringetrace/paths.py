@@ -226,14 +226,30 @@ class Paths:
         count = len(self.scene.surfaces)
         if not 0 <= surface < count:
             raise ValueError(f"visits surface: expected a number from 0 to {count - 1}, got {surface}")
+        digits, which = self.kinds()
+        mine = [number for number, (there, _) in enumerate(self.scene.digits, start=1) if there == surface]
+        return np.asarray(np.isin(digits, mine).sum(axis=1)[which], dtype=np.int64)
+
+    def kinds(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+        """The sequences among the paths (decoded from their keys), and which of them each path took.
+
+        Returns
+        -------
+        digits : (kinds, b) int64
+            For each bounce the number, from 1 on, of surface and branch in `Scene.digits`; padded with -1.
+        which : (m,) int64
+
+        Raises
+        ------
+        ValueError
+            If a path has too many bounces for its key to tell.
+        """
         # digits are never 0: equal keys mean equal numbers of bounces
         kinds = np.unique(self.key)
         which = np.searchsorted(kinds, self.key)
         bounces = np.zeros(len(kinds), dtype=np.int64)
         bounces[which] = self.bounces
-        digits = self._digits(kinds, bounces)
-        mine = [number for number, (there, _) in enumerate(self.scene.digits, start=1) if there == surface]
-        return np.asarray(np.isin(digits, mine).sum(axis=1)[which], dtype=np.int64)
+        return self._digits(kinds, bounces), which
 
     def _row(self, row: int, what: str) -> int:
         """A row counted from the start; a negative one is counted from the end."""
@@ -343,67 +359,6 @@ def screen(ccd: CCD) -> tuple[float, ...]:
     width, height = ccd.size
     numbers = [*ccd.centre, *n, *u, *v, 0.5 * width, 0.5 * height, ccd.focus]
     return tuple(float(number) for number in numbers)
-
-
-def along(paths: Paths, axis: FloatArray) -> Paths:
-    """Paths whose amplitude is the field along an axis.
-
-    Parameters
-    ----------
-    paths : Paths
-        Of light with a polarisation.
-    axis : (3,) float64, unit
-
-    Returns
-    -------
-    Paths
-    """
-    assert paths.field is not None
-    return replace(paths, amplitude=paths.field @ axis)
-
-
-def project(paths: Paths, ccd: CCD) -> Paths:
-    """Let the light that left a scene fall on a CCD beyond it, without a new trace.
-
-    Parameters
-    ----------
-    paths : Paths
-        Traced without a CCD.
-    ccd : CCD
-        Blocks nothing: light reaches it past any surface.
-
-    Returns
-    -------
-    Paths
-        Those that reach the CCD are detected there.
-
-    Raises
-    ------
-    ValueError
-        If the paths were traced onto a CCD already.
-    """
-    if paths.ccd is not None:
-        raise ValueError("project: expected paths traced without a CCD, got paths that have one")
-    u, v, n = ccd.axes
-    facing = paths.direction @ n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = ((ccd.centre - paths.origin) @ n) / facing
-        ahead = (paths.fate == Fate.LEFT) & (facing < 0.0) & (reach > 0.0)
-        reach = np.where(ahead, reach + ccd.focus / facing, 0.0)
-    point = paths.origin + reach[:, None] * paths.direction
-    offset = point - ccd.centre
-    width, height = ccd.size
-    x, y = offset @ u, offset @ v
-    seen = ahead & (abs(x) <= 0.5 * width) & (x < 0.5 * width) & (abs(y) <= 0.5 * height) & (y < 0.5 * height)
-    return replace(
-        paths,
-        fate=np.where(seen, np.int8(Fate.DETECTED), paths.fate),
-        length=np.where(
-            seen, paths.length + reach * (1.0 if paths.index is None else paths.index), paths.length
-        ),
-        origin=np.where(seen[:, None], point, paths.origin),
-        ccd=ccd,
-    )
 
 
 def _padded(columns: Sequence[Array], width: int) -> Array:

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.paths import Paths, along
+from fringetrace.interfaces import Metal
+from fringetrace.landing import along, landed
+from fringetrace.paths import Paths
 from fringetrace.rays import launch_at
 from fringetrace.scene import CCD, Beam, Scene, Surface
-from fringetrace.sheets import landed
 from fringetrace.trace import trace
 from fringetrace.triangles import weld
 from fringetrace.waves import Array, FloatArray
@@ -150,12 +151,26 @@ def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
     -------
     list of (triangles,) int64
         A number for the part that each triangle belongs to, one array a surface; below 0 on a form, and
-        on elements that curve waves.
+        beside media that absorb and on elements that curve waves: waves off there are not plane, or not even.
     """
     if "parts" not in scene.derived:
-        scene.derived["parts"] = [_parts(surface) for surface in scene.surfaces]
+        scene.derived["parts"] = [
+            _parts(surface) if _even(surface, scene) else _bent(_parts(surface)) for surface in scene.surfaces
+        ]
     parts: list[npt.NDArray[np.int64]] = scene.derived["parts"]
     return parts
+
+
+def _even(surface: Surface, scene: Scene) -> bool:
+    """Whether light beside a surface keeps its power on the way; in a metal there is none."""
+    sides = (surface.front or scene.around, surface.back or scene.around)
+    absorbs = [medium.kappa is not None for medium in sides]
+    return not (all(absorbs) if isinstance(surface.interface, Metal) else any(absorbs))
+
+
+def _bent(parts: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Parts as numbers below 0, each still a part of its own."""
+    return np.where(parts < 0, parts, parts.min(initial=0) - 1 - parts)
 
 
 def _parts(surface: Surface) -> npt.NDArray[np.int64]:

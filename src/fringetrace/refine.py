@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.bodies import Body
-from fringetrace.crossings import Fit, Meeting
+from fringetrace.crossings import Fit, LevelFit, Meeting, dot
 from fringetrace.engine import Engine, Hits
 from fringetrace.engine import find as find_facets
 from fringetrace.rays import Batch
@@ -200,6 +200,8 @@ def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
         found &= np.einsum("ij,ij->i", best.normal, rays.direction) * sense > 0.0
         untried = ~found if form.fit.complete else rays.own
         rows = np.flatnonzero(untried & ~(rays.own & (rays.leaving == sense)))
+        if isinstance(form.fit, LevelFit) and form.fit.complete:
+            rows = rows[_beside(form, form.fit, rays.part(rows), sense)]
         some, side = rays.part(rows), np.full(len(rows), sense)
         met = form.fit.meet(some.origin, some.direction, np.zeros(len(rows)), side, some.last)
         wanted = (met.path > 0.0) & (met.path < best.path[rows] * (1.0 - START))
@@ -212,6 +214,19 @@ def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
         kept, face = kept[there], face[there]
         met.face[kept] = face
         _keep(best, rows[kept], met, kept)
+
+
+def _beside(form: Formed, fit: LevelFit, rays: _Rays, sense: float) -> npt.NDArray[np.bool_]:
+    """Whether rays meet a quadric, in a sense, where its facets are, or at least in the box around them."""
+    body = form.body
+    centre, room = body.frame[:3], 2.0 * REACH * fit.sag
+    nearest = dot(centre - rays.origin, rays.direction)
+    start = rays.origin + nearest[:, None] * rays.direction
+    way = fit.guess(start, rays.direction, np.full(len(start), sense))
+    lower, upper = (corner[0] / body.frame[3] for corner in body.boxes)
+    with np.errstate(invalid="ignore"):
+        place = start + way[:, None] * rays.direction - centre
+    return np.asarray(((place >= lower - room) & (place <= upper + room)).all(axis=1))
 
 
 def _hidden(form: Formed, rays: _Rays, crossed: FloatArray, crossing: Array, best: Meeting) -> None:
@@ -235,14 +250,31 @@ def _hidden(form: Formed, rays: _Rays, crossed: FloatArray, crossing: Array, bes
     _keep(best, rows[nearer], found, nearer)
 
 
-def _refined(form: Formed, batch: Batch, rows: int, facets: Hits) -> tuple[Array, Meeting]:
-    """Rows of the batch that meet a form, and where."""
-    if form.fit.complete:
-        chosen = np.arange(rows)
-    else:
+def _passing(form: Formed, batch: Batch, rows: int, within: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which rays pass the box around a form before they have gone so far, in metres, or little farther."""
+    body = form.body
+    centre, scale = body.frame[:3], body.frame[3]
+    room = (2.0 * REACH * form.fit.sag + SIDES * form.side) * scale
+    origin, direction = (batch.state[:rows, :3] - centre) * scale, batch.state[:rows, 3:6]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = (
+            (corner[0] - origin) / direction for corner in (body.boxes[0] - room, body.boxes[1] + room)
+        )
+    along = np.isnan(one) | np.isnan(other)  # in the plane of a side
+    enter = np.where(along, -np.inf, np.minimum(one, other)).max(axis=1)
+    leave = np.where(along, np.inf, np.maximum(one, other)).min(axis=1)
+    return np.asarray((leave >= np.maximum(enter, 0.0)) & (enter <= within * scale + room))
+
+
+def _refined(
+    form: Formed, batch: Batch, rows: int, facets: Hits, within: FloatArray
+) -> tuple[Array, Meeting]:
+    """Rows of the batch that meet a form before they have gone `within` metres, and where."""
+    wanted = _passing(form, batch, rows, within)
+    if not form.fit.complete:
         last = batch.last[:rows] - form.body.first
-        own = (last >= 0) & (last < len(form.body.faces))
-        chosen = np.flatnonzero(own | (facets.triangle[:rows] >= 0))
+        wanted &= ((last >= 0) & (last < len(form.body.faces))) | (facets.triangle[:rows] >= 0)
+    chosen = np.flatnonzero(wanted)
     rays = _seen(form, batch, chosen)
     face, crossed = facets.triangle[chosen], facets.met[chosen, 0]
     face = np.where(face >= 0, face - form.body.first, -1)
@@ -250,7 +282,7 @@ def _refined(form: Formed, batch: Batch, rows: int, facets: Hits) -> tuple[Array
     _between(form, rays, best)
     if not form.fit.complete:
         _hidden(form, rays, crossed, face, best)
-    hit = np.isfinite(best.path)
+    hit = np.isfinite(best.path) & (best.path < within[chosen])
     return chosen[hit], Meeting(*(column[hit] for column in vars(best).values()))
 
 
@@ -284,14 +316,13 @@ def find(
         if form.surface in passed:
             continue
         doubtful += find_facets(engine, batch, rows, facets, everything - {form.surface})
-        chosen, met = _refined(form, batch, rows, facets)
-        nearer = met.path < hits.met[chosen, 0]
-        chosen, face = chosen[nearer], met.face[nearer]
+        chosen, met = _refined(form, batch, rows, facets, hits.met[:rows, 0])
+        face = met.face
         along = form.fit.along[face]
-        hits.met[chosen, 0] = met.path[nearer]
-        hits.met[chosen, 1:4] = met.point[nearer]
-        hits.met[chosen, 4:7] = met.normal[nearer] * np.where(along == 0, 1, along)[:, None]
-        local = (met.point[nearer] - form.body.frame[:3]) * form.body.frame[3]
+        hits.met[chosen, 0] = met.path
+        hits.met[chosen, 1:4] = met.point
+        hits.met[chosen, 4:7] = met.normal * np.where(along == 0, 1, along)[:, None]
+        local = (met.point - form.body.frame[:3]) * form.body.frame[3]
         edges = form.body.planes[face].reshape(-1, 4, 4)[:, 1:]
         inside = np.einsum("nek,nk->ne", edges[:, :, :3], local) + edges[:, :, 3]
         hits.met[chosen, 7] = inside.min(axis=1)

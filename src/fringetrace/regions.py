@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from fringetrace.contacts import indices
 from fringetrace.interfaces import refracted
+from fringetrace.landing import landed
 from fringetrace.outlines import cut
 from fringetrace.paths import Paths
 from fringetrace.probes import RIM, profile
 from fringetrace.quadrature import Samples
 from fringetrace.scene import CCD, Beam, Surface
-from fringetrace.sheets import landed
 from fringetrace.squares import CORNERS, Pieces, Squares
 from fringetrace.survey import Survey
 from fringetrace.vectors import frame, unit

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.paths import Fate, Paths
+from fringetrace.landing import landed
+from fringetrace.paths import Paths
 from fringetrace.scene import CCD, Beam
 from fringetrace.tubes import along_grid, caustics, differences
 from fringetrace.vectors import frame
 from fringetrace.waves import Array, ComplexArray, FloatArray
 
-# Light that meets the CCD's plane flatter than this (cosine) went along it, but for rounding.
-FLATTEST = 1e-9
 # From values and slopes at both ends to the coefficients of a cubic.
 HERMITE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
 
@@ -58,35 +57,6 @@ class Cells:
     turns: npt.NDArray[np.int64]
     base: float
     place: npt.NDArray[np.int64]
-
-
-def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
-    """Paths that cross the CCD's plane of focus, on the CCD or beside it.
-
-    Parameters
-    ----------
-    paths : Paths
-    ccd : CCD
-
-    Returns
-    -------
-    rows : (n,) int64
-        Which paths: those detected, and those that left the scene towards the CCD's front.
-    point : (n, 3) float64, metres
-        In the plane of focus.
-    length : (n,) float64, metres
-        Optical path to there.
-    """
-    _, _, n = frame(ccd.normal, ccd.up, "CCD")
-    facing = paths.direction @ n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = ((ccd.centre - paths.origin) @ n) / facing
-        beside = (paths.fate == Fate.LEFT) & (facing < -FLATTEST) & (reach > 0.0)
-        reach = np.where(beside, reach + ccd.focus / facing, 0.0)
-    rows = np.flatnonzero(beside | (paths.fate == Fate.DETECTED))
-    point = paths.origin[rows] + reach[rows, None] * paths.direction[rows]
-    index = 1.0 if paths.index is None else paths.index[rows]
-    return rows, point, paths.length[rows] + reach[rows] * index
 
 
 def sheets(paths: Paths) -> Iterator[Sheet]:

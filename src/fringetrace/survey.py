@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.creases import beside
+from fringetrace.landing import landed
 from fringetrace.paths import Paths, join
 from fringetrace.probes import Probe, parted
 from fringetrace.scene import CCD
-from fringetrace.sheets import checked, landed
+from fringetrace.sheets import checked
 from fringetrace.waves import Array, FloatArray
 
 # Rays sent beside edges of meshes, as many times the nodes.

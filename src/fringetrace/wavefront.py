@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace import regions, rims, sheets
-from fringetrace.paths import Paths, along
+from fringetrace import landing, regions, rims, sheets
+from fringetrace.paths import Paths
 from fringetrace.quadrature import Samples, averaged, edges
 from fringetrace.regions import Region, Wave
 from fringetrace.scene import Beam
@@ -77,10 +77,10 @@ def light(
 
     if paths.points is not None and paths.triangle is None:  # arrivals that no facet stands for
         if axis is not None:
-            paths = along(paths, axis)
+            paths = landing.along(paths, axis)
         if not half_wave_loss:
             paths = replace(paths, amplitude=paths.amplitude * (1.0 - 2.0 * (paths.reflections % 2)))
-        landed = np.unique(paths.key[sheets.landed(paths, ccd)[0]])
+        landed = np.unique(paths.key[landing.landed(paths, ccd)[0]])
         found = zip(landed, sheets.sheets(paths), strict=True)
         curved = [(group(key), sheets.cells(sheet, ccd)) for key, sheet in found]
         return Light(beam, unit, [], curved, np.empty((0, 4)))

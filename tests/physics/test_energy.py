@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import fringetrace as ft
 from fringetrace import mm, nm, shapes
-from fringetrace.paths import project
+from fringetrace.landing import project
 from fringetrace.vectors import rotation
 
 # Powers are sums of some tens of terms.

@@ -1,0 +1,155 @@
+"""The Jamin-Lebedeff interferometer: crystal plates part the light into two beams, and join them again."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fringetrace import layouts
+from fringetrace.arms import Mark
+from fringetrace.bench import Bench
+from fringetrace.crystals import ShearPlate
+from fringetrace.elements import Element, Index, Meeting
+from fringetrace.indices import Material
+from fringetrace.layouts import Sample
+from fringetrace.polarisers import Polariser, wave_plate
+from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
+from fringetrace.shapes import plate
+from fringetrace.waves import FloatArray, nm
+
+# Calcite at 589.3 nm, ordinary and extraordinary.
+CALCITE = (1.6584, 1.4864)
+SODIUM = 589.3 * nm
+# Of the polariser, the half-wave plate, the quarter-wave plate.
+HALFWAY = math.pi / 4.0
+
+
+def jamin_lebedeff(
+    sample: Sample,
+    *,
+    aperture: float,
+    index: Material | complex | str | None = None,
+    medium: Material | complex | str | None = None,
+    analyser: float = HALFWAY,
+    senarmont: bool = False,
+    shear: float | None = None,
+    crystal: tuple[Index, Index] = CALCITE,
+    half_wave: float | None = None,
+    na: float | None = None,
+    plane: float = 0.0,
+    pixels: tuple[int, int] = (512, 512),
+    rays: float = 1,
+    profile: Profile | None = None,
+    method: str = "auto",
+    design: float = SODIUM,
+) -> Bench:
+    """A Jamin-Lebedeff interferometer: polarised, both beams through the same plates side by side.
+
+    Light along +z, polarised at 45 degrees, meets a shear plate, a half-wave plate (which swaps the two
+    polarisations), the sample, a second shear plate like the first, the analyser. The ordinary beam goes
+    straight to the sample and is displaced behind it, the extraordinary one passes beside the sample; the
+    retardances of the plates cancel. A sample that delays by delta gives cos^2(delta/2) with the analyser
+    along the polariser, sin^2(delta/2) across it. Phase steps delay the extraordinary beam.
+
+    Parameters
+    ----------
+    sample : Mesh, Surface, or several surfaces, metres
+        As for `mach_zehnder`.
+    aperture : float, metres
+        Width of the beam and of the image.
+    index, medium : Material, number or name
+        As for `mach_zehnder`.
+    analyser : float, radians
+        From x towards y; the polariser stands at pi/4.
+    senarmont : bool
+        A quarter-wave plate, its slow axis along the polariser, before the analyser: the light is linear, and
+        dark at an analyser of 3 pi/4 - delta/2.
+    shear : float, metres, optional
+        Distance of the two beams. Default: what image and sample need, and a quarter more.
+    crystal : (ordinary, extraordinary)
+        Indices of the shear plates, numbers or functions of the wavelength in metres, such as
+        `materials.CALCITE_O.index`.
+    half_wave : float, metres, optional
+        Wavelength at which the half-wave plate is one; it leaks at others. None: at all.
+    na, plane, pixels, rays, profile, method
+        As for `mach_zehnder`.
+    design : float, metres
+        Wavelength for which the plates' thickness is found.
+
+    Returns
+    -------
+    Bench
+        `path_difference` has the optical path that the sample adds.
+
+    Raises
+    ------
+    ValueError
+        If a length, a number of pixels or of rays is not positive, an index is missing or given twice, the
+        shear is too small for image and sample, the crystal has none, or the aperture is too large.
+    TypeError
+        If the sample is no mesh.
+    """
+    size = layouts.checked_image("jamin_lebedeff", aperture, pixels, rays)
+    surfaces = layouts.transparent("jamin_lebedeff", sample, index)
+    aside, deep = layouts.extent(surfaces, max(size))
+    least = max(float(np.abs([s.mesh.bounds[:, 0] for s in surfaces]).max()) + 0.5 * aperture, aperture)
+    shear = 1.25 * least if shear is None else shear
+    if not shear >= least:
+        raise ValueError(f"jamin_lebedeff shear: expected at least {least:g} m, got {shear!r}")
+    space = Scene(surfaces, layouts.surrounding(medium))
+    stop = 1.1 * max(deep, abs(plane)) + 0.25 * max(size)
+    plates, moved = _plates(shear, crystal, layouts.real_index(space.around, design), design)
+    half = wave_plate((1.0, 1.0, 0.0), 0.5, half_wave)
+    wide = 100.0 * (stop + aside + shear)
+
+    def across(z: float, element: Element, name: str) -> Surface:
+        return Surface(plate(wide, wide).moved((0.0, 0.0, z)), element, name)
+
+    quarter = (
+        [across(4.0 * stop, wave_plate((1.0, 1.0, 0.0), 0.25), "quarter-wave plate")] if senarmont else []
+    )
+    scene = Scene(
+        (
+            across(-3.0 * stop, plates, "first plate"),
+            across(-2.0 * stop, half, "half-wave plate"),
+            *surfaces,
+            across(2.0 * stop, layouts.pupil("jamin_lebedeff", space, na, design), "pupil"),
+            across(3.0 * stop, plates, "second plate"),
+            *quarter,
+            across(
+                5.0 * stop, Polariser(np.array([math.cos(analyser), math.sin(analyser), 0.0])), "analyser"
+            ),
+        ),
+        space.medium,
+    )
+    _, y, z = np.eye(3)
+    beam = Beam(
+        centre=-4.0 * stop * z, direction=z, up=y, size=size, shape=layouts.ray_grid(pixels, rays),
+        profile=layouts.seen(profile), polarisation=np.array([-math.cos(HALFWAY), math.sin(HALFWAY)]),
+    )  # fmt: skip
+    ccd = CCD(
+        centre=6.0 * stop * z + moved, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels,
+        focus=6.0 * stop - plane,
+    )  # fmt: skip
+    return Bench(
+        scene, beam, ccd, reference=0, method=method, mark=Mark(0, branch=2), immersion=scene.medium
+    )  # fmt: skip
+
+
+def _plates(
+    shear: float, crystal: tuple[Index, Index], index: float, wavelength: float
+) -> tuple[ShearPlate, FloatArray]:
+    """A plate that displaces the extraordinary beam by so much, and its displacement (3,)."""
+    axis = np.array([1.0, 0.0, 1.0])
+    ray = Meeting(
+        point=np.zeros((1, 3)), direction=np.array([[0.0, 0.0, 1.0]]), normal=np.array([[0.0, 0.0, 1.0]]),
+        index=np.array([index]), field=np.array([[1.0 + 0j, 0.0, 0.0]]), wavelength=wavelength,
+    )  # fmt: skip
+    point = ShearPlate(axis, 1.0, *crystal).act(ray)[1].point
+    assert point is not None
+    slope = point[0]
+    size = float(np.abs(slope).max())
+    if not size > 0.0:
+        raise ValueError(f"jamin_lebedeff crystal: expected two different indices, got {crystal!r}")
+    return ShearPlate(axis, shear / size, *crystal), slope * (shear / size)
