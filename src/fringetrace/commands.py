@@ -12,6 +12,8 @@ import numpy as np
 from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
 
 if TYPE_CHECKING:
+    from fringetrace.mesh import Mesh
+    from fringetrace.rods import Lattice
     from fringetrace.tables import DataArray
 
 # What there is to say, each under a word.
@@ -19,6 +21,9 @@ Lines = list[tuple[str, str]]
 # Samples of a spectrum from 300 to 700 nm: one a nanometre.
 WAVELENGTHS = ("300 nm", "700 nm", "401")
 FILES = ("brdf.nc", "brdf.csv", "spectra.png")
+LAYERS = "reflectance.csv"
+# Part of the largest extent up to which a part counts as flat.
+FLAT = 1e-6
 
 
 def brdf(
@@ -34,6 +39,7 @@ def brdf(
     method: str = "rays",
     reflectance: float = 1.0,
     hemisphere: int = 0,
+    feature: str | None = None,
     threads: int | None = None,
 ) -> Lines:
     """BRDF of a mesh of mirrors, its normal along z: spectra from each angle into each.
@@ -63,14 +69,20 @@ def brdf(
         Of the mesh.
     hemisphere
         Observe the whole upper hemisphere instead: so many rings, four times as many sectors.
+    feature
+        Radius of the roundest small parts, to say what rays are worth. Default: half of the least extent
+        of any connected part of the mesh.
     threads
         Default: one for each core.
     """
     from fringetrace import goniometer, measurement, meshes
+    from fringetrace.harmonics import CONDUCTOR
     from fringetrace.interfaces import Mirror
     from fringetrace.scene import Scene, Surface
+    from fringetrace.validity import validity
 
     sample = meshes.load(mesh, unit=unit)
+    radius = _extent(sample) / 2.0 if feature is None else parse_length(feature, "--feature")
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     detector: goniometer.Cells | goniometer.Cones = goniometer.Cones(
         theta, parse_angle(acceptance, "--acceptance")
@@ -84,10 +96,14 @@ def brdf(
             scene, theta, detector, _steps(wavelengths, "--wavelengths", parse_length), method=method,
             rays=rays, threads=threads,
         )  # fmt: skip
+        worth = validity(radius, float(table.wavelength.max()), CONDUCTOR)
+        table.attrs |= worth.attributes
         _write(table, part)
+    guess = "" if feature else f" (radius {radius:.3g} m estimated from the mesh's parts; --feature says it)"
     return [
         ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
         *_powers(table),
+        ("rays", f"{worth}{guess}"),
         ("written", f"{folder}: {', '.join(FILES)}"),
     ]
 
@@ -102,6 +118,10 @@ def lattice(
     arrangement: tuple[str, ...] = ("staggered",),
     disorder: tuple[float, ...] = (0.0,),
     seed: tuple[int, ...] = (0,),
+    rod: str | None = None,
+    host: str | None = None,
+    cortex: str | None = None,
+    channel: str | None = None,
     angles: tuple[str, str] = ("60 deg", "7"),
     wavelengths: tuple[str, str, str] = WAVELENGTHS,
     acceptance: str = "0.64 deg",
@@ -109,7 +129,7 @@ def lattice(
     method: str = "rays",
     scheduler: str | None = None,
 ) -> Lines:
-    """BRDF of lattices of mirror rods, for every combination of the values given.
+    """BRDF of lattices of rods, for every combination of the values given.
 
     What is done is kept in OUT/cells as it comes; the same command goes on where it was stopped.
     Written to the folder OUT: brdf.nc, brdf.csv, spectra.png.
@@ -128,8 +148,17 @@ def lattice(
         Root mean square of displacements, in pitches.
     seed
         Of the displacements.
-    angles, wavelengths, acceptance, method
+    rod, host
+        Index or material, such as melanin and keratin, of rods and of what is around them. Default: mirrors
+        in a vacuum.
+    cortex, channel
+        Thickness of the host above the rods; radius of air channels amid them.
+    angles, wavelengths, acceptance
         As in `fringetrace brdf`.
+    method
+        rays, diffraction or power, as in `fringetrace brdf`; rods: rigorous, light with its electric field
+        along them; multilayer: specular reflectance of endless rows, as flat layers of effective index,
+        beside the rigorous one, of one lattice: reflectance.csv alone.
     rays
         Across a lattice.
     scheduler
@@ -144,11 +173,19 @@ def lattice(
     spoken = dict(given)
     for name in ("radius", "pitch"):
         given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
-    base = studies.Lattice(**{name: values[0] for name, values in given.items()})
+    matter = {
+        "rod": _medium(rod), "host": _medium(host),
+        "cortex": 0.0 if cortex is None else parse_length(cortex, "--cortex"),
+        "channel": None if channel is None else parse_length(channel, "--channel"),
+    }  # fmt: skip
+    base = studies.Lattice(**{name: values[0] for name, values in given.items()}, **matter)
     axes = {name: values for name, values in given.items() if len(values) > 1}
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
+    waves = _steps(wavelengths, "--wavelengths", parse_length)
+    if method == "multilayer":
+        return _endless(base, axes, theta[theta >= 0.0], waves, out)
     table = studies.study(
-        base, axes, theta, theta, _steps(wavelengths, "--wavelengths", parse_length), rays=rays,
+        base, axes, theta, theta, waves, rays=rays,
         half_angle=parse_angle(acceptance, "--acceptance"), method=method,
         folder=os.fspath(out / "cells"), scheduler=scheduler,
     )  # fmt: skip
@@ -159,6 +196,7 @@ def lattice(
     return [
         ("lattices", f"{count} of {', '.join(axes) or 'one kind'}; {same}"),
         *_powers(table),
+        ("rays", f"at worst: {table.attrs['validity']}"),
         ("written", f"{out}: {', '.join(FILES)}"),
     ]
 
@@ -199,6 +237,50 @@ def init(name: str, /) -> Iterator[tuple[str, str]]:
     yield "", templates.template(name)
 
 
+def _medium(text: str | None) -> Any:
+    """A material's name, or an index; None for none."""
+    try:
+        return None if text is None else complex(text)
+    except ValueError:
+        return text
+
+
+def _endless(base: Lattice, axes: dict[str, Any], theta: FloatArray, waves: FloatArray, out: Path) -> Lines:
+    """Specular spectra of endless rows, layered and rigorous."""
+    from fringetrace import measurement, studies, tables
+
+    if axes:
+        raise ValueError(f"--method multilayer: expected one lattice, got several of {', '.join(axes)}")
+    methods = ("multilayer", "rods")
+    both = [studies.specular(base, theta, waves, method=method) for method in methods]
+    axes = {"method": (list(methods), ""), "theta_i": (theta, "rad"), "wavelength": (waves, "m")}
+    table = tables.labelled([one.values for one in both], axes, name="reflectance", unit="1")
+    with measurement.staged(out) as part:
+        tables.write_rows(table, part / LAYERS)
+    top = [one.isel(one.argmax(...)) for one in both]
+    said = (f"{float(one):.3g} at {float(one.wavelength) * 1e9:.4g} nm" for one in top)
+    return [
+        ("largest", "layers {}, rods {}".format(*said)),
+        ("rays", str(both[0].attrs["validity"])),
+        ("written", f"{out}: {LAYERS}"),
+    ]
+
+
+def _extent(mesh: Mesh) -> float:
+    """Least extent along x, y or z of any connected part of a mesh that is not flat there, metres."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.vertices)
+    ends = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
+    part = connected_components(coo_matrix((np.ones(len(ends[0])), ends), (count, count)), directed=False)[1]
+    order = np.argsort(part, kind="stable")
+    first = np.flatnonzero(np.diff(part[order], prepend=-1))
+    reach = (f.reduceat(mesh.vertices[order], first) for f in (np.maximum, np.minimum))
+    extent = np.subtract(*reach)
+    return float(extent[extent > FLAT * extent.max()].min())
+
+
 def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
     """From first to last in equal steps."""
     first, last, count = given
@@ -221,10 +303,12 @@ def _powers(table: DataArray) -> Lines:
     shares = []
     for name in ("reflected", "transmitted", "missed", "absorbed", "truncated"):
         low, high = float(table[name].min()), float(table[name].max())
+        if np.isnan(low):  # rigorous rods do not say
+            continue
         shares.append(f"{name} {low:.2%}" + (f" to {high:.2%}" if high - low > 5e-5 else ""))
     top = table.isel(table.argmax(...))
     where = (
         f"{float(top):.4g} / sr at {float(top.wavelength) * 1e9:.4g} nm, "
         f"from {float(top.theta_i) / degree:.3g} to {float(top.theta_o) / degree:.3g} deg"
     )
-    return [("power", ", ".join(shares)), ("largest", where)]
+    return [("power", ", ".join(shares) or "not told by this method"), ("largest", where)]

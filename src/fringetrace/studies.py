@@ -4,123 +4,172 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import fields, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.cylinders import differential_width, scatter
 from fringetrace.detectors import Cones, checked_angles
 from fringetrace.farfield import FATES
 from fringetrace.goniometer import AXES, brdf
-from fringetrace.interfaces import Mirror
-from fringetrace.mesh import Mesh
+from fringetrace.harmonics import Polarisation
+from fringetrace.lattices import spectrum
 from fringetrace.nufft import checked_wavelengths
-from fringetrace.scene import Scene, Surface
-from fringetrace.shapes import rod_lattice
+from fringetrace.rods import MEDIA
+from fringetrace.rods import Lattice as Lattice
 from fringetrace.sweeps import grid, sweep
 from fringetrace.tables import array
-from fringetrace.waves import FloatArray, checked_length, degree
+from fringetrace.waves import FloatArray, degree
 
 if TYPE_CHECKING:
+    from fringetrace.indices import Material
     from fringetrace.tables import DataArray
-
-# Distance of the rows in pitches, and how far every second one is shifted.
-ARRANGEMENTS = {"square": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (0.5 * np.sqrt(3.0), 0.5)}
-
-
-@dataclass(frozen=True)
-class Lattice:
-    """Rods along y in rows across z, the topmost row highest.
-
-    Parameters
-    ----------
-    columns, rows : int
-    radius, pitch, length : float, metres
-        Of the rods; the distance of neighbours in a row; along y.
-    arrangement : {"square", "staggered", "hexagonal"}
-        Rows a pitch apart; every second one shifted by half a pitch; and sqrt(3)/2 of a pitch apart.
-    spacing : float, metres, optional
-        Distance of the rows. Default: by the arrangement.
-    disorder : float
-        Root mean square of the displacement of rods along x and along z, in pitches; normally
-        distributed. Rods may come to overlap.
-    seed : int
-        Of the displacements.
-    sides : int
-        Of each rod.
-    reflectance : float
-
-    Raises
-    ------
-    ValueError
-        For counts, lengths, arrangements or disorder that cannot be.
-    """
-
-    columns: int = 20
-    rows: int = 4
-    radius: float = 65e-9
-    pitch: float = 280e-9
-    length: float = 2e-6
-    arrangement: str = "staggered"
-    spacing: float | None = None
-    disorder: float = 0.0
-    seed: int = 0
-    sides: int = 18
-    reflectance: float = 1.0
-
-    def __post_init__(self) -> None:
-        if self.arrangement not in ARRANGEMENTS:
-            names = ", ".join(ARRANGEMENTS)
-            raise ValueError(f"lattice arrangement: expected one of {names}, got {self.arrangement!r}")
-        for count, what in ((self.columns, "columns"), (self.rows, "rows")):
-            if not (isinstance(count, (int, np.integer)) and count > 0):
-                raise ValueError(f"lattice {what}: expected a whole number from 1, got {count!r}")
-        for length, what in ((self.pitch, "pitch"), (self.spacing, "spacing")):
-            if length is not None:
-                checked_length(length, f"lattice {what}")
-        if not (np.isfinite(self.disorder) and self.disorder >= 0.0):
-            raise ValueError(f"lattice disorder: expected a number of at least 0, got {self.disorder!r}")
-
-    @property
-    def centres(self) -> FloatArray:
-        """(columns * rows, 2) float64, metres: x and z of the axes, column by column, about the origin."""
-        apart, shift = ARRANGEMENTS[self.arrangement]
-        spacing = apart * self.pitch if self.spacing is None else self.spacing
-        column, row = (
-            i.ravel() for i in np.meshgrid(*map(np.arange, (self.columns, self.rows)), indexing="ij")
-        )
-        x = (column + shift * (row % 2)) * self.pitch
-        places = np.stack([x, row * spacing], axis=1)
-        places -= 0.5 * (places.min(axis=0) + places.max(axis=0))
-        wander = np.random.default_rng(self.seed).standard_normal(places.shape)
-        return np.asarray(places + self.disorder * self.pitch * wander)
-
-    @property
-    def mesh(self) -> Mesh:
-        """The rods, as `shapes.rod_lattice` has them; `shapes.rod_of_triangle` tells which is which."""
-        rod = rod_lattice(1, 1, self.radius, self.pitch, self.length, sides=self.sides)
-        offset = np.insert(self.centres, 1, 0.0, axis=1)
-        vertices = offset[:, None] + rod.vertices
-        faces = rod.faces + len(rod.vertices) * np.arange(len(offset))[:, None, None]
-        return Mesh(vertices.reshape(-1, 3), faces.reshape(-1, 3), f"{self.arrangement} lattice")
-
-    @property
-    def scene(self) -> Scene:
-        """The rods as mirrors."""
-        return Scene((Surface(self.mesh, Mirror(self.reflectance), "rods"),))
 
 
 def _cell(
     theta_i: npt.ArrayLike, theta_o: npt.ArrayLike, half_angle: float, wavelengths: npt.ArrayLike,
-    method: str, rays: int, max_bounces: int, **parameters: Any,
+    method: str, rays: int, max_bounces: int, min_amplitude: float, indices: FloatArray,
+    media: Mapping[str, Material], **parameters: Any,
 ) -> dict[str, FloatArray]:  # fmt: skip
     """One lattice: its BRDF in the plane across the rods, and where the power went."""
+    lattice = Lattice(**parameters | {name: media.get(parameters[name]) for name in MEDIA})
+    if method == "rods":
+        values = cluster(lattice, theta_i, theta_o, wavelengths)
+        unknown = np.full((len(values), 1), np.nan)
+        return {"brdf": values[:, None, :, None], **dict.fromkeys(FATES, unknown)}
     table = brdf(
-        Lattice(**parameters).scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths,
-        method=method, rays=(1, rays), max_bounces=max_bounces, threads=1,
+        lattice.scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths, method=method,
+        rays=(1, rays), max_bounces=max_bounces, min_amplitude=min_amplitude, threads=1, **lattice.lighting,
     )  # fmt: skip
     return {"brdf": table.values, **{name: table[name].values for name in FATES}}
+
+
+def cluster(
+    lattice: Lattice,
+    theta_i: npt.ArrayLike,
+    theta_o: npt.ArrayLike,
+    wavelengths: npt.ArrayLike,
+    polarisation: Polarisation = "E",
+) -> FloatArray:
+    """BRDF of a lattice in the plane across its rods, by rigorous multiple scattering.
+
+    f = (length / wavelength) (d sigma / d theta) / (width cos theta_i cos theta_o): rods of a length of
+    many waves send d sigma / d theta into a lobe that is wavelength / length wide along them, and its
+    middle is what ray sums give in the same plane. A host's front face lets light in and out (Snell,
+    Fresnel); what it throws back, of the incident light or from below, is left out.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Rods may not overlap.
+    theta_i, theta_o : (n,) radians
+        Position angles, outside of the host.
+    wavelengths : (w,) float64, metres
+    polarisation : ``"E"`` or ``"H"``
+        The field along the rods. Rays take the amplitudes of "E".
+
+    Returns
+    -------
+    (theta_i, theta_o, wavelength) float64, 1/sr
+
+    Raises
+    ------
+    ValueError
+        As `cylinders.Cylinders` and `cylinders.scatter`; for mirrors that absorb.
+    """
+    start, end = checked_angles(theta_i, "cluster theta_i"), checked_angles(theta_o, "cluster theta_o")
+    rods, (width, _) = lattice.cylinders, lattice.footprint
+    values = []
+    for wave in checked_wavelengths(wavelengths):
+        host = 1.0 if lattice.host is None else float(lattice.host.index(wave).real)
+        (inward, into), (outward, out) = (_through(host, angle, polarisation) for angle in (start, end))
+        scattered = scatter(rods, float(wave), -np.pi / 2 - inward, polarisation)
+        sent = differential_width(scattered, np.pi / 2 - outward)
+        # a width is over the irradiance inside; an angle outside is wider than that inside
+        wider = np.cos(end) / (host * np.cos(outward))
+        entered = into * np.cos(start) / np.cos(inward)
+        whole = lattice.length / wave * entered[:, None] * sent * out * wider
+        values.append(whole / (width * np.cos(start)[:, None] * np.cos(end)))
+    return np.stack(values, axis=-1)
+
+
+def _through(host: float, angle: FloatArray, polarisation: Polarisation) -> tuple[FloatArray, FloatArray]:
+    """Angles inside of a host, and the parts of the power that pass its face."""
+    inside = np.arcsin(np.sin(angle) / host)
+    here, there = np.cos(angle), host * np.cos(inside)
+    if polarisation == "H":
+        here, there = here * host, there / host
+    return inside, 4.0 * here * there / (here + there) ** 2
+
+
+def specular(
+    lattice: Lattice,
+    theta_i: npt.ArrayLike,
+    wavelengths: npt.ArrayLike,
+    *,
+    method: str = "rods",
+    polarisation: Polarisation | Literal["unpolarised"] = "unpolarised",
+) -> DataArray:
+    """What a lattice of rows that never end reflects, rigorously or as a multilayer.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Without disorder; its columns do not matter.
+    theta_i : (n,) radians
+        From where, outside of the host.
+    wavelengths : (w,) float64, metres
+    method, polarisation
+        See `lattices.spectrum`.
+
+    Returns
+    -------
+    xarray.DataArray, float64, 1
+        Axes theta_i, wavelength: reflected over incident power, all diffraction orders together; with
+        the transmitted part, and what rays would be worth.
+
+    Raises
+    ------
+    ValueError
+        As `Lattice.endless` and `lattices.spectrum`.
+    """
+    start, waves = checked_angles(theta_i, "specular theta_i"), checked_wavelengths(wavelengths)
+    found = spectrum(lattice.endless, waves, start[:, None], polarisation, method)
+    axes = ("theta_i", "wavelength")
+    coordinates = {
+        "theta_i": ("theta_i", start, {"units": "rad"}),
+        "wavelength": ("wavelength", waves, {"units": "m"}),
+        "transmitted": (axes, found.transmittance, {"units": "1"}),
+    }
+    attributes: dict[str, Any] = {
+        "units": "1",
+        "long_name": "reflectance",
+        "method": method,
+        "polarisation": polarisation,
+    }
+    attributes |= believed([lattice], waves)
+    return array(found.reflectance, axes, coordinates, "reflectance", attributes)
+
+
+def believed(kinds: Sequence[Lattice], waves: FloatArray) -> dict[str, float | str]:
+    """What rays are worth on the smallest of some rods, at the longest of some wavelengths: attributes."""
+    return min((kind.validity(waves.max()) for kind in kinds), key=lambda v: v.size_parameter).attributes
+
+
+def _spoken(lattice: Lattice) -> dict[str, Any]:
+    """Parameters of a lattice, materials by name."""
+    return vars(lattice) | {
+        name: medium.name for name in MEDIA if (medium := getattr(lattice, name)) is not None
+    }
+
+
+def _indices(lattice: Lattice, waves: FloatArray) -> npt.NDArray[np.complex128]:
+    """Of rod and host at each wavelength, 0 for none: names alone do not tell materials apart."""
+    media = [getattr(lattice, name) for name in MEDIA]
+    return np.array([np.zeros(len(waves)) if medium is None else medium.index(waves) for medium in media])
 
 
 def study(
@@ -134,6 +183,7 @@ def study(
     method: str = "rays",
     rays: int = 2000,
     max_bounces: int = 100,
+    min_amplitude: float = 1e-3,
     folder: str | os.PathLike[str] | None = None,
     **sweeping: Any,
 ) -> DataArray:
@@ -151,9 +201,14 @@ def study(
     half_angle : float, radians
         Acceptance, see `goniometer.Cones`.
     method, max_bounces
-        See `goniometer.brdf`.
+        See `goniometer.brdf`; or "rods": the rigorous answer in the same unit, see `cluster`, for light
+        with its electric field along the rods. It has no use for half angle, rays and bounces, and does
+        not say where the power went (NaN). For endless rows, and as a multilayer, see `specular`.
     rays : int
         Across the lattice.
+    min_amplitude : float
+        Branches below this part of the launched amplitude are cut off, see `trace`: matter splits rays
+        at each boundary.
     folder, sweeping
         See `sweeps.sweep`: kept results, executor, scheduler, processes, progress.
 
@@ -176,12 +231,17 @@ def study(
     observation = checked_angles(theta_o, "lattice study theta_o")
     fixed = {
         "theta_i": incidence, "theta_o": observation, "half_angle": half_angle, "wavelengths": waves,
-        "method": method, "rays": rays, "max_bounces": max_bounces,
+        "method": method, "rays": rays, "max_bounces": max_bounces, "min_amplitude": min_amplitude,
     }  # fmt: skip
-    cells = [vars(replace(lattice, **values)) | fixed for values in grid(**axes)]
-    done = sweep(_cell, cells, folder, **sweeping)
+    kinds = [replace(lattice, **values) for values in grid(**axes)]
+    media = {m.name: m for kind in kinds for m in (kind.rod, kind.host) if m is not None}
+    cells = [_spoken(kind) | fixed | {"indices": _indices(kind, waves)} for kind in kinds]
+    done = sweep(partial(_cell, media=media), cells, folder, **sweeping)
     shape = tuple(len(values) for values in axes.values())
-    coordinates: dict[str, Any] = {name: (name, list(values)) for name, values in axes.items()} | {
+    coordinates: dict[str, Any] = {
+        name: (name, [str(v) for v in values] if name in MEDIA else list(values))
+        for name, values in axes.items()
+    } | {
         "theta_i": ("theta_i", incidence, {"units": "rad"}),
         "phi_i": ("phi_i", np.zeros(1), {"units": "rad"}),
         "theta_o": ("theta_o", observation, {"units": "rad"}),
@@ -192,9 +252,10 @@ def study(
         share = np.stack([one[name] for one in done])
         coordinates[name] = ((*axes, *AXES[:2]), share.reshape(*shape, *share.shape[1:]), {"units": "1"})
     values = np.stack([one["brdf"] for one in done])
-    attributes = {"units": "sr-1", "long_name": "BRDF", "method": method, "half_angle_rad": half_angle} | {
-        f"lattice_{name}": value
-        for name, value in vars(lattice).items()
+    attributes = {"units": "sr-1", "long_name": "BRDF", "method": method, "half_angle_rad": half_angle}
+    attributes |= believed(kinds, waves) | {
+        f"lattice_{name}": int(value) if isinstance(value, bool) else value
+        for name, value in _spoken(lattice).items()
         if name not in axes and value is not None
     }
     return array(values.reshape(*shape, *values.shape[1:]), (*axes, *AXES), coordinates, "brdf", attributes)

@@ -37,6 +37,14 @@ class Validity:
     ray_error: float
     label: str
 
+    @property
+    def attributes(self) -> dict[str, float | str]:
+        """The same for a table's attributes."""
+        return {
+            "size_parameter": self.size_parameter, "phase_across_rad": self.phase,
+            "ray_error": self.ray_error, "validity": str(self),
+        }  # fmt: skip
+
     def __str__(self) -> str:
         return f"size parameter {self.size_parameter:.3g}, phase across {self.phase:.3g} rad: {self.label}"
 
