@@ -8,6 +8,9 @@ import numpy as np
 
 from fringetrace.exact import jit, part
 
+# A wave fades along a boundary if so much of its squared wave number there is imaginary: more than rounding.
+ASLANT = 1e-9
+
 
 @jit
 def normal(index, sine2):
@@ -152,6 +155,25 @@ def clear(first, last, q):
 
 
 @part
+def aslant(first, q1):
+    """Whether a wave fades along the boundary: never between parallel faces.
+
+    As an endless wave it might bring power along that is not in it; rays are to keep theirs.
+    """
+    return abs((q1 * q1 - first * first).imag) > ASLANT * abs(first * first)
+
+
+@part
+def bounded(r, t):
+    """Amplitudes of power with no more power than came; what is reflected goes first."""
+    size = r.real * r.real + r.imag * r.imag
+    rest, through = 1.0 - size, t.real * t.real + t.imag * t.imag
+    if rest <= 0.0:
+        return r / np.sqrt(size), 0j
+    return r, t * np.sqrt(rest / through) if through > rest else t
+
+
+@part
 def bare(first, last, q1):
     """Amplitudes of power of a bare boundary, r_s, r_p, t_s, t_p, and the normal part behind."""
     if first.imag == 0.0 and last.imag == 0.0 and q1.imag == 0.0 and q1.real > 0.0 and first != last:
@@ -159,7 +181,10 @@ def bare(first, last, q1):
     q2 = beneath(first, last, q1)
     rs, rp, ts, tp = fresnel(first, q1, last, q2)
     s, p = powers(first, q1, last, q2)
-    return rs, rp, ts * s, tp * p, q2
+    ts, tp = ts * s, tp * p
+    if aslant(first, q1):
+        (rs, ts), (rp, tp) = bounded(rs, ts), bounded(rp, tp)
+    return rs, rp, ts, tp, q2
 
 
 @part
@@ -186,4 +211,7 @@ def coated(film, surface, front, first, last, q1, k0):
     depth = thickness[a:b] if front else backwards[1][a:b]
     rs, rp, ts, tp = stack(first * first - q1 * q1, first, layers, depth, last, k0)
     s, p = powers(first, q1, last, q2)
-    return rs, rp, ts * s, tp * p, q2
+    ts, tp = ts * s, tp * p
+    if aslant(first, q1):
+        (rs, ts), (rp, tp) = bounded(rs, ts), bounded(rp, tp)
+    return rs, rp, ts, tp, q2
