@@ -7,7 +7,7 @@ import glass
 import numpy as np
 import pytest
 from columns import BARE
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import fringetrace as ft
@@ -352,6 +352,9 @@ indices = st.floats(1.0, 3.0)
     film=st.lists(st.tuples(indices, st.floats(0.0, 500.0)), max_size=2), polarised=st.booleans(),
     slope=st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)),
 )  # fmt: skip
+@example(
+    first=1.5, second=1.0, around=1.0, state=(0.0, 1.0, 0.0), film=[], polarised=False, slope=(0.0, -2e-313)
+)
 @settings(max_examples=15)
 def test_power_adds_up(first, second, around, state, film, polarised, slope):
     """In lossless scenes nothing is absorbed, at any angle, state and index."""

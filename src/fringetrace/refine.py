@@ -256,7 +256,7 @@ def _passing(form: Formed, batch: Batch, rows: int, within: FloatArray) -> npt.N
     centre, scale = body.frame[:3], body.frame[3]
     room = (2.0 * REACH * form.fit.sag + SIDES * form.side) * scale
     origin, direction = (batch.state[:rows, :3] - centre) * scale, batch.state[:rows, 3:6]
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         one, other = (
             (corner[0] - origin) / direction for corner in (body.boxes[0] - room, body.boxes[1] + room)
         )
