@@ -147,8 +147,7 @@ def far_field(
     absorbing : mapping of Material to Material, optional
         Media of the scene that stand, clear, for others: light is bent and split by their index, and
         absorbed along its way as those others do. For small parts of weak absorption, inside which rays
-        are reflected many times: waves that fade across their direction are no rays, and may gain power
-        from one reflection to the next.
+        are reflected many times: waves that fade across their direction are no rays.
 
     Returns
     -------
