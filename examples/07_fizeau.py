@@ -37,5 +37,6 @@ for ax, (name, image), colour in zip(panels, images.items(), ("#0072B2", "#D55E0
     ft.views.interferogram(image, bench.ccd.pitch, ax, wavelength=wavelength, title=name)
     section.plot(x[150:] / mm, image[150, 150:] / image[150].max(), color=colour, label=name)
 section.set(xlabel="distance from the centre / mm", ylabel="irradiance / largest", title="section, y = 0")
-section.legend(loc="lower right")
+section.set_ylim(0, 1.25)
+section.legend(loc="upper right", ncols=2)
 ft.views.save(figure, "07_fizeau.png")

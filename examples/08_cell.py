@@ -41,6 +41,7 @@ figure.get_layout_engine().set(w_pad=0.15)  # inches
 fringes, map, section = figure.subplots(1, 3)
 ft.views.interferogram(image, bench.ccd.pitch, fringes, wavelength=wavelength)
 ft.views.height(path, bench.ccd.pitch, map, title="optical path added")
+map.images[0].colorbar.set_label("optical path / nm")
 section.plot(at / um, path[row] / nm, color="#0072B2", label="phase steps")
 section.plot(at / um, straight / nm, ":", color="#D55E00", label="straight through")
 section.set(xlabel="x / µm", ylabel="optical path / nm", title="section, y = 1 µm")
