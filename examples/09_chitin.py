@@ -22,10 +22,10 @@ x, z = np.repeat(np.arange(-20, 21, 10), 2), np.concatenate([[0], np.repeat(trea
 stairs = ft.shapes.extrude(np.stack([x, z], axis=1) * um, 30 * um, closed=True)
 flake = ft.Surface(stairs, ft.Dielectric("transmitted"), "flake", back=ft.materials.CHITIN)
 crossed = ft.instruments.jamin_lebedeff(
-    flake, aperture=50 * um, medium=oil, crystal=calcite, analyser=135 * degree, pixels=(90, 120), rays=2, method="rays"
+    flake, aperture=60 * um, medium=oil, crystal=calcite, analyser=135 * degree, pixels=(90, 120), rays=2, method="rays"
 )
 image = crossed.interferogram(sodium)
-seen = image[45, 24:120:24]
+seen = image[45, 30:100:20]
 expected = np.sin(np.pi * (ft.materials.CHITIN.index(sodium).real - oil) * treads * um / sodium) ** 2
 print("stairs:", np.round(seen, 4), "sin^2(delay / 2):", np.round(expected, 4))
 

@@ -43,7 +43,7 @@ for strip, (name, axis) in zip(strips, {"crossed": (0, 1, 0), "parallel": (1, 0,
     strip.set(title=f"{name} polarisers, number of layers below")
     strip.set_aspect("auto")
     if name == "crossed":
-        swatches.spectrum(passed[[0, 2, 5]], waves, curves, labels=[f"{n} layers, crossed" for n in layers[[0, 2, 5]]])
-curves.set_ylabel("part that passes")
-curves.legend(loc="upper right")
+        swatches.spectrum(passed[[0, 2, 5]], waves, curves, labels=["1 layer", "3 layers", "6 layers"])
+curves.set(ylabel="part that passes, crossed", ylim=(-0.08, 1.3))
+curves.legend(loc="upper right", ncols=3)
 ft.views.save(figure, "11_polarisers.png")
