@@ -40,9 +40,17 @@ for surface in bench.scene.surfaces:
         side.plot(*corners.T[[0, 2]] / um, color="black", linewidth=2)
 for i in np.flatnonzero(paths.fate == ft.Fate.DETECTED):
     by_reference = bench.reference in paths.surface[i]
-    side.plot(*paths.polyline(i).T[[0, 2]] / um, color="#E69F00" if by_reference else "#0072B2", linewidth=0.8)
+    side.plot(
+        *paths.polyline(i).T[[0, 2]] / um, color="#E69F00" if by_reference else "#0072B2", linewidth=0.8
+    )
 side.plot([-unit / um, unit / um], [bench.ccd.centre[2] / um] * 2, color="#009E73", linewidth=4)
-names = {"light": (-34, 12), "camera": (12, 38), "sample": (12, -41), "splitter": (-25, 26), "reference": (24, 14)}
+names = {
+    "light": (-34, 12),
+    "camera": (12, 38),
+    "sample": (12, -41),
+    "splitter": (-25, 26),
+    "reference": (24, 14),
+}
 for name, place in names.items():
     side.text(*place, name)
 side.set(xlabel="x / µm", ylabel="z / µm", aspect="equal", title="24 rays of the middle row")

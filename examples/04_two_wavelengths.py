@@ -33,7 +33,9 @@ figure.get_layout_engine().set(w_pad=0.15)  # inches
 first, second, section = figure.subplots(1, 3)
 for ax, phase, wavelength in ((first, phases[0], orange), (second, phases[1], red)):
     ft.views.phase(phase, bench.ccd.pitch, ax, title=f"phase at {wavelength / nm:g} nm")
-section.plot(x / mm, (alone[100] - alone[100, 25]) / um, ":", color="#D55E00", label="one wavelength, unwrapped")
+section.plot(
+    x / mm, (alone[100] - alone[100, 25]) / um, ":", color="#D55E00", label="one wavelength, unwrapped"
+)
 section.plot(x / mm, both[100] / um, color="#0072B2", label="two wavelengths")
 section.set(xlabel="x / mm", ylabel="height / µm", title="section, y = 0")
 section.legend()

@@ -21,7 +21,7 @@ else:
     z, pitch = ft.meshes.elevation_sample(relief=2 * um, aperture=8 * mm)
 sample = ft.shapes.height_map(z, pitch)
 high = np.nanmax(z) - np.nanmin(z)
-print(f"{z.shape[0]} x {z.shape[1]} samples, {pitch / um:.3g} um apart, {high / um:.3f} um from lowest to highest")
+print(f"{z.shape[0]} x {z.shape[1]} samples, {pitch / um:.3g} um apart, {high / um:.3f} um peak to valley")
 
 aperture = 0.96 * pitch * (min(z.shape) - 1)
 bench = ft.instruments.michelson(
@@ -39,5 +39,10 @@ print(f"height against the mesh: {rms / nm:.4f} nm rms, {rms / wavelength:.1e} w
 
 left, right = ft.views.pair()
 ft.views.interferogram(image, bench.ccd.pitch, left, wavelength=wavelength)
-ft.views.height(ft.phase.remove_plane(height), bench.ccd.pitch, right, title="height from four phase steps, plane taken off")
+ft.views.height(
+    ft.phase.remove_plane(height),
+    bench.ccd.pitch,
+    right,
+    title="height from four phase steps, plane taken off",
+)
 ft.views.save(left, "05_surface.png")

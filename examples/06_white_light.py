@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 import fringetrace as ft
 from fringetrace import mm, nm, spectra, swatches, um
 
-thickness, tilt, aperture = 50 * um, 0.5e-3, 8 * mm  # of the splitter; of the reference, rad; width of the image
+thickness, aperture = 50 * um, 8 * mm  # of the splitter; width of the image
+tilt = 0.5e-3  # of the reference, rad
 waves = np.arange(400, 701, 4) * nm
 n = ft.materials.BK7.index(waves).real
 glass = 2 * thickness * (np.sqrt(n**2 - 0.5) - math.sqrt(0.5))  # path of two crossings at 45 degrees
@@ -28,8 +29,8 @@ for name, strip, colour in zip(names, strips, ("#0072B2", "#D55E00"), strict=Tru
     alone = name.startswith("without")
     bench = ft.instruments.michelson(
         ft.shapes.plate(12 * mm, 12 * mm), aperture=aperture, pixels=(4, 400), rays=1 / 4,
-        reference_tilt=(tilt, 0), piston=0.5 * np.interp(550 * nm, waves, group) if alone else 0.0, compensator=not alone,
-        splitter=ft.instruments.SplitterPlate(thickness, "BK7", ghosts=False),
+        reference_tilt=(tilt, 0), piston=0.5 * np.interp(550 * nm, waves, group) * alone,
+        splitter=ft.instruments.SplitterPlate(thickness, "BK7", ghosts=False), compensator=not alone,
     )  # fmt: skip
     images = np.stack([bench.interferogram(wavelength)[2] for wavelength in waves], axis=-1)
     swatches.strip(spectra.xyz(images, waves, illuminant="E"), x / mm, strip)
@@ -41,9 +42,16 @@ for name, strip, colour in zip(names, strips, ("#0072B2", "#D55E00"), strict=Tru
         seen = bench.trace(wavelength).detected
         by_reference = seen.visits(bench.reference) == 1
         crossing.append(seen.length[~by_reference].mean() - seen.length[by_reference].mean())
-    print(f"{name}: at 450 nm the paths differ by {(crossing[0] - crossing[1]) / um:.3f} um more than at 650 nm")
+    print(
+        f"{name}: at 450 nm the paths differ by {(crossing[0] - crossing[1]) / um:.3f} um more than at 650 nm"
+    )
 low, high = np.interp([450 * nm, 650 * nm], waves, glass)
 print(f"without, in closed form: {(low - high) / um:.3f} um")
-curves.set(xlabel="x / mm", ylabel="mean irradiance\nof all wavelengths", xlim=(x[0] / mm, x[-1] / mm), ylim=(0, 0.85))
+curves.set(
+    xlabel="x / mm",
+    ylabel="mean irradiance\nof all wavelengths",
+    xlim=(x[0] / mm, x[-1] / mm),
+    ylim=(0, 0.85),
+)
 curves.legend()
 ft.views.save(figure, "06_white_light.png")

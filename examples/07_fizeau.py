@@ -19,7 +19,14 @@ images = {}
 for name, film in (("bare glass", None), ("coated", layer)):
     sample = ft.Surface(flat, ft.Dielectric(film=film), "flat", front=1.0, back=1.5)
     bench = ft.instruments.fizeau(
-        sample, aperture=4 * mm, gap=gap, radius=radius, coating=film, pixels=(300, 300), rays=1 / 10, max_bounces=13
+        sample,
+        aperture=4 * mm,
+        gap=gap,
+        radius=radius,
+        coating=film,
+        pixels=(300, 300),
+        rays=1 / 10,
+        max_bounces=13,
     )
     images[name] = bench.interferogram(wavelength)
 

@@ -2,8 +2,8 @@
 The index of chitin by a Jamin-Lebedeff interferometer
 ======================================================
 
-Two polarised beams, one through the flake and one beside it, are parted and joined by calcite. The paths that a
-flake adds at seven wavelengths give Cauchy's law of its index back.
+Two polarised beams, one through the flake and one beside it, are parted and joined by calcite. The paths that
+a flake adds at seven wavelengths give Cauchy's law of its index back.
 """
 
 import numpy as np
@@ -22,7 +22,14 @@ x, z = np.repeat(np.arange(-20, 21, 10), 2), np.concatenate([[0], np.repeat(trea
 stairs = ft.shapes.extrude(np.stack([x, z], axis=1) * um, 30 * um, closed=True)
 flake = ft.Surface(stairs, ft.Dielectric("transmitted"), "flake", back=ft.materials.CHITIN)
 crossed = ft.instruments.jamin_lebedeff(
-    flake, aperture=60 * um, medium=oil, crystal=calcite, analyser=135 * degree, pixels=(90, 120), rays=2, method="rays"
+    flake,
+    aperture=60 * um,
+    medium=oil,
+    crystal=calcite,
+    analyser=135 * degree,
+    pixels=(90, 120),
+    rays=2,
+    method="rays",
 )
 image = crossed.interferogram(sodium)
 seen = image[45, 30:100:20]

@@ -2,8 +2,8 @@
 Three lenses in a Twyman-Green interferometer
 =============================================
 
-A singlet, the same turned round, and an achromat, from catalogue data. A ball about their focus sends the light
-back; what is left of the fringes is their spherical aberration.
+A singlet, the same turned round, and an achromat, from catalogue data. A ball about their focus sends the
+light back; what is left of the fringes is their spherical aberration.
 """
 
 import math
@@ -32,7 +32,9 @@ for ax, (name, (radii, thicknesses, glasses)) in zip(panels, CATALOGUE.items(), 
     paths = ft.trace(ft.Scene(lens), rays)
     focus = paths.origin[:, 2] - paths.origin[:, 0] / paths.direction[:, 0] * paths.direction[:, 2]
     shorter = (focus[0] - focus[1]) / mm
-    print(f"{name}: focus {focus[0] / mm:.3f} mm behind the first vertex, {shorter:.3f} mm shorter at the rim")
+    print(
+        f"{name}: focus {focus[0] / mm:.3f} mm behind the first vertex, {shorter:.3f} mm shorter at the rim"
+    )
 
     # the ball stands about the middle of both; the camera sees the first vertex of the lens
     centre = (0, 0, -focus.mean())

@@ -2,8 +2,8 @@
 Layers of film between two polarisers
 =====================================
 
-Film that delays one polarisation by 220 nm lies one to eight layers thick between polarisers: if they are crossed,
-sin^2 of half the retardance passes of each wavelength, and all the rest if they are parallel.
+Film that delays one polarisation by 220 nm lies one to eight layers thick between polarisers: if they are
+crossed, sin^2 of half the retardance passes of each wavelength, and all the rest if they are parallel.
 """
 
 import numpy as np

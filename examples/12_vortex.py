@@ -2,8 +2,8 @@
 A vortex in a Mach-Zehnder interferometer
 =========================================
 
-A spiral phase plate winds the phase of one arm twice about the axis. Against a tilted plane wave the fringes fork
-into two more; phase steps show the winding itself.
+A spiral phase plate winds the phase of one arm twice about the axis. Against a tilted plane wave the
+fringes fork into two more; phase steps show the winding itself.
 """
 
 import numpy as np

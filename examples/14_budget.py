@@ -2,8 +2,8 @@
 The error budget, beside the true error
 =======================================
 
-A hollow mirror of 1 m radius, its facets ever finer: what they cost is estimated from the mesh alone, and measured
-against the hollow's exact form. A quarter with every halving of the facets; rounding stays far below.
+A hollow mirror of 1 m radius, its facets ever finer: what they cost is estimated from the mesh alone, and
+measured against the hollow's exact form. It is a quarter with every halving of the facets.
 """
 
 import numpy as np
@@ -13,7 +13,9 @@ import fringetrace as ft
 from fringetrace import mm, nm
 
 wavelength, width = 632.8 * nm, 8 * mm
-hollow = ft.forms.Conic((0, 0, 0), (0, 0, -1), 1.0, -1.0)  # a paraboloid: vertex, axis, radius in metres, conic constant
+hollow = ft.forms.Conic(
+    (0, 0, 0), (0, 0, -1), 1.0, -1.0
+)  # a paraboloid: vertex, axis, radius in metres, conic constant
 cells = np.array([8, 16, 32, 64])
 terms = {name: [] for name in ("facets", "pixels", "sampling", "hit", "true")}
 for count in cells:
@@ -31,11 +33,13 @@ for count in cells:
     for name in ("facets", "pixels", "sampling", "hit"):
         terms[name].append(getattr(budget, name))
     terms["true"].append(rms)
-    print(f"{count:2d} x {count:2d} cells: facets cost {budget.facets:.1e} waves by the budget, {rms:.1e} in truth")
+    print(f"{count:2d} cells a side: facets cost {budget.facets:.1e} waves by the budget, {rms:.1e} in truth")
 print(budget)
 
 ax = Figure(figsize=(8, 5), layout="constrained").subplots()
-ax.loglog(cells, terms["true"], "o", color="black", markersize=9, markerfacecolor="none", label="facets, true error")
+ax.loglog(
+    cells, terms["true"], "o", color="black", markersize=9, markerfacecolor="none", label="facets, true error"
+)
 for (name, values), style in zip(terms.items(), ("-", "--", "-.", ":"), strict=False):
     colour = dict(facets="#D55E00", pixels="#0072B2", sampling="#009E73", hit="#999999")[name]
     ax.loglog(cells, values, style, marker=".", color=colour, label=f"{name}, estimated")

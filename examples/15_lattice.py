@@ -2,8 +2,8 @@
 Light among the rods of a lattice
 =================================
 
-Twenty by four mirror rods of 18 sides, lit at 20 degrees. Facets at multiples of 20 degrees send light to -20 degrees
-after odd numbers of reflections, and to 40 after even ones, up to multiples of 40 degrees.
+Twenty by four mirror rods of 18 sides, lit at 20 degrees. Facets at multiples of 20 degrees send light to -20
+degrees after odd numbers of reflections, and to 40 after even ones, up to multiples of 40 degrees.
 """
 
 import numpy as np
@@ -31,7 +31,11 @@ corner = 2 * np.pi * np.arange(18) / 18
 prism = lattice.radius * np.stack([np.cos(corner), np.sin(corner)], axis=1)
 for centre in lattice.centres:
     rods.fill(*(centre + prism).T / um, color="#606060")
-classes = (("1 reflection", 1, 1, "#0072B2"), ("2 reflections", 2, 2, "#E69F00"), ("3 and more", 3, 100, "#CC79A7"))
+classes = (
+    ("1 reflection", 1, 1, "#0072B2"),
+    ("2 reflections", 2, 2, "#E69F00"),
+    ("3 and more", 3, 100, "#CC79A7"),
+)
 polar = figure.add_subplot(1, 3, 3, projection="polar")
 below = np.zeros(18)
 for name, least, most, colour in classes:
@@ -43,7 +47,8 @@ for name, least, most, colour in classes:
     counts = np.bincount(np.rint(angle[chosen] / 20).astype(int) % 18, minlength=18)
     polar.bar(np.arange(18) * 20 * degree, counts, 14 * degree, below, color=colour, label=name)
     below += counts
-rods.set(xlabel="x / µm", ylabel="z / µm", aspect="equal", xlim=(-3.4, 3.4), ylim=(-1.6, 2), title="some of the rays")
+rods.set(xlabel="x / µm", ylabel="z / µm", xlim=(-3.4, 3.4), ylim=(-1.6, 2), title="some of the rays")
+rods.set_aspect("equal")
 polar.set_theta_zero_location("N")
 polar.set_theta_direction(-1)
 polar.set_rgrids((200, 400, 600, 800), angle=110)

@@ -40,7 +40,9 @@ for i, o in np.ndindex(7, 7):
     ax = panels[i, o]
     ax.plot(waves / nm, every[i, o], color="#0072B2", linewidth=1, label="all reflections")
     ax.plot(waves / nm, once[i, o], ":", color="#D55E00", linewidth=1, label="one reflection")
-    ax.vlines((445, 525), 0, 450, color="#999999", linestyle="--", linewidth=0.7, label="bands of the feather")
+    ax.vlines(
+        (445, 525), 0, 450, color="#999999", linestyle="--", linewidth=0.7, label="bands of the feather"
+    )
     ax.set(xlim=(300, 700), ylim=(0, 450))
     if i == 0:
         ax.set_title(f"to {theta[o] / degree:.0f}°", fontsize="medium")

@@ -2,8 +2,8 @@
 A peacock's lattices, rigorously
 ================================
 
-Melanin rods in keratin are as small as a wavelength: rays are no answer there, exact multiple scattering is. Four
-lattices, with sizes from the literature on blue, green, yellow and brown barbules, have a band each, near Bragg's.
+Melanin rods in keratin are smaller than a wavelength: rays are no answer there, exact multiple scattering is.
+Four lattices, sized as in the barbules of four colours, have a band each, near Bragg's.
 """
 
 import numpy as np
@@ -15,8 +15,11 @@ from fringetrace import nm, spectra, studies, swatches
 waves = np.arange(400, 701, 5) * nm
 # barbule: period along the normal, pitch along a row, rod diameter (nm), layers
 BARBULES = {
-    "blue": (140, 140, 101, 10), "green": (150, 150, 108, 10), "yellow": (165, 165, 119, 6), "brown": (185, 150, 108, 4),
-}  # fmt: skip
+    "blue": (140, 140, 101, 10),
+    "green": (150, 150, 108, 10),
+    "yellow": (165, 165, 119, 6),
+    "brown": (185, 150, 108, 4),
+}
 
 curves, labels = [], []
 for name, (period, pitch, diameter, layers) in BARBULES.items():
@@ -28,7 +31,9 @@ for name, (period, pitch, diameter, layers) in BARBULES.items():
     curves.append(reflectance)
     labels.append(f"{layers} layers, {period} nm apart")
     part = np.pi * diameter**2 / (4 * period * pitch)  # of the section that is melanin
-    melanin, keratin = (medium.index(500 * nm).real for medium in (ft.materials.MELANIN, ft.materials.KERATIN))
+    melanin, keratin = (
+        medium.index(500 * nm).real for medium in (ft.materials.MELANIN, ft.materials.KERATIN)
+    )
     bragg = 2 * (part * melanin + (1 - part) * keratin) * period
     band = waves[reflectance.argmax()] / nm
     print(f"{name}: {labels[-1]}: band at {band:.0f} nm; Bragg, 2 * mean index * period: {bragg:.0f} nm")

@@ -37,7 +37,11 @@ rows = [
     (disc / disc[:, 1].max(), eye / degree, "CD, white light from 30°: angle to the eye / °"),
 ]
 first = rows[0][0][path.searchsorted(575 * nm)]
-print("Newton's sensitive tint, 575 nm: sRGB", np.rint(255 * spectra.srgb(first)).astype(int), "expected [54 41 207]")
+print(
+    "Newton's sensitive tint, 575 nm: sRGB",
+    np.rint(255 * spectra.srgb(first)).astype(int),
+    "expected [54 41 207]",
+)
 
 figure = Figure(figsize=(8, 6.5), layout="constrained")
 for ax, (xyz, places, label) in zip(figure.subplots(5, 1), rows, strict=True):
