@@ -37,6 +37,6 @@ section.plot(
     x / mm, (alone[100] - alone[100, 25]) / um, ":", color="#D55E00", label="one wavelength, unwrapped"
 )
 section.plot(x / mm, both[100] / um, color="#0072B2", label="two wavelengths")
-section.set(xlabel="x / mm", ylabel="height / µm", title="section, y = 0")
-section.legend()
+section.set(xlabel="x / mm", ylabel="height / µm", title="section, y = 0", ylim=(-0.6, 4.4))
+section.legend(loc="upper left")
 ft.views.save(figure, "04_two_wavelengths.png")

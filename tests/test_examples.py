@@ -1,4 +1,4 @@
-"""What all examples have in common: short, titled as a gallery wants, one picture, no library of their own."""
+"""What examples have in common: short, titled as a gallery wants, one picture, no library of their own."""
 
 import ast
 import json
