@@ -109,7 +109,8 @@ def split(cells, domain, lines, rows, columns):
             more = 0.0 if even else 0.1 * max(right - left, high - low)
             leaf = leaves[count]
             leaf[CELL], leaf[S0], leaf[S1], leaf[T0], leaf[T1], leaf[SIGN] = cell, s0, s1, t0, t1, sign
-            leaf[LEFT], leaf[RIGHT], leaf[LOW], leaf[HIGH] = left - more, right + more, low - more, high + more
+            leaf[LEFT], leaf[RIGHT] = left - more, right + more
+            leaf[LOW], leaf[HIGH] = low - more, high + more
             leaf[A], leaf[B], leaf[C] = lines[cell, 0], lines[cell, 1], lines[cell, 2]
             count += 1
     return leaves[:count]
