@@ -49,6 +49,7 @@ for body in bodies:
 """
 
 
+@pytest.mark.slow
 def test_more_scenes_may_be_alive_than_posix_has_keys():
     # 1024 of them: with one for each scene the interpreter crashes, so in a process of its own
     done = subprocess.run([sys.executable, "-c", CROWD], capture_output=True, text=True, timeout=120)
