@@ -106,24 +106,16 @@ def jamin_lebedeff(
     half = wave_plate((1.0, 1.0, 0.0), 0.5, half_wave)
     wide = 100.0 * (stop + aside + shear)
 
-    def across(z: float, element: Element, name: str) -> Surface:
-        return Surface(plate(wide, wide).moved((0.0, 0.0, z)), element, name)
-
-    quarter = (
-        [across(4.0 * stop, wave_plate((1.0, 1.0, 0.0), 0.25), "quarter-wave plate")] if senarmont else []
-    )
+    ahead: dict[str, tuple[float, Element]] = {"first plate": (-3.0, plates), "half-wave plate": (-2.0, half)}
+    behind: dict[str, tuple[float, Element]] = {
+        "pupil": (2.0, layouts.pupil("jamin_lebedeff", space, na, design)),
+        "second plate": (3.0, plates),
+    }
+    if senarmont:
+        behind["quarter-wave plate"] = (4.0, wave_plate((1.0, 1.0, 0.0), 0.25))
+    behind["analyser"] = (5.0, Polariser(np.array([math.cos(analyser), math.sin(analyser), 0.0])))
     scene = Scene(
-        (
-            across(-3.0 * stop, plates, "first plate"),
-            across(-2.0 * stop, half, "half-wave plate"),
-            *surfaces,
-            across(2.0 * stop, layouts.pupil("jamin_lebedeff", space, na, design), "pupil"),
-            across(3.0 * stop, plates, "second plate"),
-            *quarter,
-            across(
-                5.0 * stop, Polariser(np.array([math.cos(analyser), math.sin(analyser), 0.0])), "analyser"
-            ),
-        ),
+        (*_in_line(ahead, stop, wide), *surfaces, *_in_line(behind, stop, wide)),
         space.medium,
     )
     _, y, z = np.eye(3)
@@ -138,6 +130,14 @@ def jamin_lebedeff(
     return Bench(
         scene, beam, ccd, reference=0, method=method, mark=Mark(0, branch=2), immersion=scene.medium
     )  # fmt: skip
+
+
+def _in_line(train: dict[str, tuple[float, Element]], stop: float, wide: float) -> tuple[Surface, ...]:
+    """Elements across the axis by name, each at so many `stop` along it."""
+    return tuple(
+        Surface(plate(wide, wide).moved((0.0, 0.0, place * stop)), element, name)
+        for name, (place, element) in train.items()
+    )
 
 
 def _plates(
