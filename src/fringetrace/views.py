@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import os
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fringetrace.drawing import opengl, picture, show, unit_of
+from fringetrace.tables import whole
 from fringetrace.waves import Array, FloatArray, checked_wavelength
 
 if TYPE_CHECKING:
@@ -354,9 +353,6 @@ def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0)
         Pixels an inch.
     """
     figure: Any = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)
-    target = Path(path)
-    with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=target.parent) as folder:
-        part = Path(folder, target.name)
+    with whole(path) as part:
         lightly = {"pil_kwargs": {"compress_level": 1}} if part.suffix == ".png" else {}
         figure.savefig(part, dpi=dpi, **lightly)
-        os.replace(part, target)
