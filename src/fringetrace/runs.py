@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace import guards, measurement, tables
-from fringetrace.arms import pixel_centres
+from fringetrace import frames, guards, measurement, records, tables
 from fringetrace.bench import Bench
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.media import needs
@@ -241,44 +240,35 @@ def _tif(name: str, find: Callable[[Run, float], FloatArray]) -> Callable[[Run, 
 
     def write(current: Run, folder: Path) -> None:
         images = _stack(current, lambda wavelength: find(current, wavelength))
-        scale = max(1.0, float(images.max()))
         images = images[0] if len(images) == 1 else images
         wavelengths = list(current.setup.wavelengths)
-        measurement.write_counts(folder / name, images, current.ccd.pitch, scale, wavelengths_m=wavelengths)
+        frames.save(images, current.ccd.pitch, folder / name, wavelengths_m=wavelengths)
 
     return write
 
 
-def _images(current: Run, folder: Path, name: str, variables: dict[str, Any]) -> None:
+def _images(current: Run, folder: Path, name: str, images: dict[str, Array]) -> None:
     """Labelled images (wavelength, [component,] y, x) as NetCDF."""
-    x, y = pixel_centres(current.ccd.shape, current.ccd.pitch)
-    coordinates = {
-        "wavelength": ("wavelength", np.array(current.setup.wavelengths), {"units": "m"}),
-        "x": ("x", x, {"units": "m"}),
-        "y": ("y", y, {"units": "m"}),
+    labelled = {
+        what: (("wavelength", "component")[: values.ndim - 2], values) for what, values in images.items()
     }
-    attributes = {"pixel_pitch_m": current.ccd.pitch, "method": current.method}
-    tables.write_netcdf(tables.dataset(variables, coordinates, attributes), folder / name)
+    axes = {"wavelength": (np.array(current.setup.wavelengths), "m")}
+    table = records.dataset(labelled, current.ccd.pitch, axes, method=current.method)
+    tables.write_netcdf(table, folder / name)
 
 
 def _interferogram_nc(current: Run, folder: Path) -> None:
-    notes = {"units": "1", "long_name": "irradiance / incident irradiance, |E|^2"}
-    light = {"interferogram": (("wavelength", "y", "x"), _stack(current, current.image), notes)}
-    _images(current, folder, "interferogram.nc", light)
+    _images(current, folder, "interferogram.nc", {"interferogram": _stack(current, current.image)})
 
 
 def _height_nc(current: Run, folder: Path) -> None:
     heights = _stack(current, lambda wavelength: _height(current, wavelength))
-    notes = {"units": "m", "comment": "up to a constant"}
-    _images(current, folder, "height.nc", {"height": (("wavelength", "y", "x"), heights, notes)})
+    _images(current, folder, "height.nc", {"height": heights})
 
 
 def _field_nc(current: Run, folder: Path) -> None:
     light = _stack(current, current.field)
-    axes = ("wavelength", "y", "x") if light.ndim == 3 else ("wavelength", "component", "y", "x")
-    notes = {"units": "1", "comment": "field ~ exp(+i k OPL); components along columns, rows, normal"}
-    parts = {"field_real": (axes, light.real, notes), "field_imag": (axes, light.imag, notes)}
-    _images(current, folder, "field.nc", parts)
+    _images(current, folder, "field.nc", {"field_real": light.real, "field_imag": light.imag})
 
 
 def _paths_nc(current: Run, folder: Path) -> None:
