@@ -295,7 +295,7 @@ def _write(table: DataArray, folder: Path) -> None:
 
     tables.write_netcdf(table, folder / "brdf.nc")
     tables.write_rows(table, folder / "brdf.csv")
-    views.save(views.spectra(table), folder / "spectra.png")
+    views.save(views.overview(table), folder / "spectra.png")
 
 
 def _powers(table: DataArray) -> Lines:
