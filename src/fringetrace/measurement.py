@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -23,6 +23,7 @@ from fringetrace.mesh import Mesh
 from fringetrace.meshes import interpolate_height
 from fringetrace.paths import Ledger
 from fringetrace.waves import Array, FloatArray
+from fringetrace.zygo import write_height_map
 
 if TYPE_CHECKING:
     from fringetrace.tables import Dataset
@@ -268,6 +269,20 @@ def write_camera(measurement: Measurement, folder: Path) -> None:
     for name, images in (("interferogram", m.interferogram), ("frames", m.frames)):
         path = folder / f"{name}.tif"
         frames.save(images, m.pitch, path, full_scale=m.full_scale, wavelength_m=m.wavelength)
+
+
+def write_heights(measurement: Measurement, folder: Path, kinds: Iterable[str]) -> None:
+    """height.dat or height.datx: the measured height as a file of Zygo's.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    folder : Path
+    kinds : iterable of {"dat", "datx"}
+    """
+    m = measurement
+    for kind in kinds:
+        write_height_map(m.height, m.pitch, folder / f"height.{kind}", wavelength=m.wavelength)
 
 
 def write_pictures(measurement: Measurement, folder: Path) -> None:

@@ -22,6 +22,7 @@ from fringetrace.scene import CCD, Beam
 from fringetrace.scenes import Setup
 from fringetrace.trace import trace
 from fringetrace.waves import Array, ComplexArray, FloatArray, nm
+from fringetrace.zygo import write_height_map
 
 # Rays of the 3D picture along the longer side.
 DRAWN = 12
@@ -190,13 +191,18 @@ def _named(wavelength: float) -> str:
     return f"{wavelength / nm:.7g} nm"
 
 
+def _marked(name: str, current: Run) -> Iterator[tuple[float, str]]:
+    """Wavelengths, and the name of a file at each: after the wavelength, too, if there are several."""
+    several = len(current.setup.wavelengths) > 1
+    for wavelength in current.setup.wavelengths:
+        yield wavelength, f"{name}-{_named(wavelength).replace(' ', '')}" if several else name
+
+
 def _pictures(name: str, current: Run, folder: Path, draw: Callable[[float], Any]) -> None:
     """A picture for each wavelength, named after it if there are several."""
     from fringetrace import views
 
-    several = len(current.setup.wavelengths) > 1
-    for wavelength in current.setup.wavelengths:
-        marked = f"{name}-{_named(wavelength).replace(' ', '')}" if several else name
+    for wavelength, marked in _marked(name, current):
         views.save(draw(wavelength), folder / f"{marked}.png")
 
 
@@ -208,6 +214,17 @@ def _interferogram_png(current: Run, folder: Path) -> None:
         return views.interferogram(image, current.ccd.pitch, wavelength=wavelength, title="Interferogram")
 
     _pictures("interferogram", current, folder, draw)
+
+
+def _height_map(kind: str) -> Callable[[Run, Path], None]:
+    """A writer of the height as a file of Zygo's, one for each wavelength."""
+
+    def write(current: Run, folder: Path) -> None:
+        for wavelength, marked in _marked("height", current):
+            z = _height(current, wavelength)
+            write_height_map(z, current.ccd.pitch, folder / f"{marked}.{kind}", wavelength=wavelength)
+
+    return write
 
 
 def _height_png(current: Run, folder: Path) -> None:
@@ -343,4 +360,6 @@ WRITERS: dict[str, Callable[[Run, Path], str | None]] = {
     "frames.tif": _tif("frames.tif", _frames),
     "height.png": _height_png,
     "height.nc": _height_nc,
+    "height.dat": _height_map("dat"),
+    "height.datx": _height_map("datx"),
 }
