@@ -19,8 +19,6 @@ VALUES: dict[str, Any] = {
     "aperture": "8 mm", "gap": "0.1 mm", "index": 1.34, "pixels": [128, 128], "rays": 0.5,
     "reference_tilt": ["200 urad", 0.0],
 }  # fmt: skip
-# The same where a bench needs another one.
-OWN: dict[str, dict[str, Any]] = {}
 BEGINNINGS: dict[str, Any] = {"m": "1 mm", "rad": "1 deg", "": 1.0}
 # What light is sent back by, and what it goes through.
 STEP = {"type": '"step"', "width": '"10 mm"', "height": '"10 mm"', "edge": '"1 mm"', "rise": '"100 nm"'}
@@ -99,7 +97,6 @@ def _bench(name: str, kind: Kind) -> str:
     """All parameters of a bench with what is said of them; those with a default as comments."""
     known = parameters(kind)
     first = " ".join((inspect.getdoc(kind) or name).partition("\n\n")[0].split())
-    meant = {**VALUES, **OWN.get(name, {})}
     height = "reference_tilt" in known and not _through(known)
     outputs = ["interferogram.png", "interferogram.nc", *(["height.png"] if height else [])]
     lines = [
@@ -112,7 +109,7 @@ def _bench(name: str, kind: Kind) -> str:
             end = lines if _through(known) else tables
             end += ["", *_comment(parameter.text), *_sample(parameter, _through(known))]
         else:
-            lines += ["", *_comment(parameter.text), _value(parameter, meant)]
+            lines += ["", *_comment(parameter.text), _value(parameter)]
     return "\n".join([*lines, *tables]) + "\n"
 
 
@@ -129,10 +126,10 @@ def _line(key: str, value: Any) -> str:
     return dump({key: value}).rstrip()
 
 
-def _value(parameter: Parameter, meant: dict[str, Any]) -> str:
+def _value(parameter: Parameter) -> str:
     """A line with a value; behind a # if it is the default."""
-    if parameter.name in meant:
-        return _line(parameter.name, meant[parameter.name])
+    if parameter.name in VALUES:
+        return _line(parameter.name, VALUES[parameter.name])
     if parameter.required:
         return _line(parameter.name, BEGINNINGS[parameter.unit])
     if parameter.default is None:
