@@ -54,7 +54,7 @@ def test_measured_reflectances_lie_over_a_reflectance_as_they_are():
     ax = views.spectra(brdf(1, "1").isel(theta_o=0), measured=MEASURED)
     assert ax.get_ylabel() == "brdf"
     model, *over = ax.lines
-    assert model.get_label().startswith("_")
+    assert model.get_label() == "model"
     assert [line.get_label() for line in over] == ["blue", "green"]
     assert [line.get_linestyle() for line in over] == ["--", ":"]
     assert {line.get_color() for line in over} == {"black"}
@@ -62,8 +62,10 @@ def test_measured_reflectances_lie_over_a_reflectance_as_they_are():
     assert ax.get_xlim() == pytest.approx((400, 700))
 
 
-def test_over_a_brdf_white_is_lambertian():
-    ax = views.spectra(brdf(1), measured=MEASURED)
+@pytest.mark.parametrize("unit", ["1/sr", "sr-1"])
+def test_over_a_brdf_white_is_lambertian(unit):
+    ax = views.spectra(brdf(1, unit), measured=MEASURED)
+    assert ax.get_ylabel() == "BRDF / sr⁻¹"
     assert ax.lines[1].get_label() == "blue / π"
     np.testing.assert_allclose(ax.lines[1].get_ydata(), 0.5 / np.pi)
 

@@ -19,7 +19,7 @@ def brdf(theta_i, theta_o, phi_o=(0.0,), wavelengths=W, **lengths):
     }  # fmt: skip
     shape = [len(values) for values, _ in axes.values()]
     values = np.arange(float(np.prod(shape))).reshape(shape)
-    return tables.labelled(values, axes, name="brdf", unit="1/sr")
+    return tables.labelled(values, axes, name="brdf", unit="sr-1")
 
 
 PLANE = brdf([-20, 0, 20], [-30, -10, 10, 30])
@@ -145,6 +145,7 @@ def test_spectra_towards_the_mirror_with_measured_ones_over():
         [[0.3, 0.3]], {"sample": (["a"], ""), "wavelength": (W[:2], "m")}, name="r", unit="1"
     )
     table = brdf([-20, 0, 20], [-30, -21, 2, 19, 30])
+    table[0] += 100.0
     figure = views.mirror_spectra(table, sample)
     assert titles(figure) == [
         rf"$\theta_i$ = {start}°, $\theta_o$ = {end}°" for start, end in (("−20", 19), (0, 2), (20, "−21"))
@@ -153,8 +154,10 @@ def test_spectra_towards_the_mirror_with_measured_ones_over():
     for ax, row, ring in zip(panels, table, (3, 2, 1), strict=True):
         np.testing.assert_array_equal(ax.lines[0].get_ydata(), row[0, ring, 0])
         np.testing.assert_allclose(ax.lines[1].get_ydata(), 0.3 / np.pi)
+        # the highest may be in any panel
+        assert ax.get_ylim()[1] > max(line.get_ydata().max() for other in panels for line in other.lines)
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["a / π"]
+    assert [text.get_text() for text in legend.get_texts()] == ["model", "a / π"]
     assert (figure.get_supxlabel(), figure.get_supylabel()) == ("wavelength / nm", "BRDF / sr⁻¹")
     assert not views.mirror_spectra(table).legends
     # in the hemisphere the mirror of -40 degrees is at 40, towards +x

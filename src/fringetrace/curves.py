@@ -28,6 +28,7 @@ STRONG = (3, 4, 5, 6, 1, 2, 0)
 MARGIN = 2.0
 # Spectral colours are shown this bright, of what the brightest of them would be.
 GLOW = 0.8
+PER_STERADIAN = ("sr-1", "1/sr")
 SYMBOLS = {"theta_i": r"$\theta_i$", "theta_o": r"$\theta_o$", "phi_i": r"$\phi_i$", "phi_o": r"$\phi_o$"}
 
 # By curve: rays, seconds, error; and these by panel.
@@ -87,7 +88,7 @@ def label(table: DataArray) -> str:
     str
     """
     unit = table.attrs.get("units", "1")
-    if unit == "1/sr":
+    if unit in PER_STERADIAN:
         return "BRDF / sr⁻¹"
     return str(table.name or "value") + ("" if unit == "1" else f" / {unit}")
 
@@ -214,18 +215,19 @@ def spectra(
     varied = [name for name in others if table.sizes[name] > 1]
     rows = np.asarray(flat).reshape(-1, table.sizes["wavelength"])
     ax = blank() if ax is None else ax
-    at = np.asarray(table["wavelength"]) / nm
+    at, alone = np.asarray(table["wavelength"]) / nm, None if measured is None else "model"
     places = np.ndindex(*(table.sizes[name] for name in others))
     for values, place, (colour, _, line) in zip(rows, places, styles(len(rows), "spectra"), strict=True):
         corner = flat[place]
         named = [short(name, corner[name].item()) for name in varied if name in corner.coords]
-        ax.plot(at, values, color=colour, linestyle=line, label=", ".join(named) or None)
+        ax.plot(at, values, color=colour, linestyle=line, label=", ".join(named) or alone)
     if measured is not None:
-        lambertian = table.attrs.get("units") == "1/sr"
+        lambertian = table.attrs.get("units") in PER_STERADIAN
         lay_over(ax, measured, *((1.0 / np.pi, " / π") if lambertian else ()))
     ax.set(xlabel="wavelength / nm", ylabel=label(table), xlim=(at.min(), at.max()))
     if title:
         ax.set_title(title)
+    ax.autoscale(axis="y")  # again, for axes that share their scale
     top = ax.get_ylim()[1]
     ax.set_ylim(-0.06 * top, top)
     rainbow(ax)
