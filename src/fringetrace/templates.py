@@ -20,8 +20,9 @@ VALUES: dict[str, Any] = {
     "reference_tilt": ["200 urad", 0.0],
 }  # fmt: skip
 BEGINNINGS: dict[str, Any] = {"m": "1 mm", "rad": "1 deg", "": 1.0}
-# What light is sent back by, and what it goes through.
+# What light is sent back by, once or to and fro, and what it goes through.
 STEP = {"type": '"step"', "width": '"10 mm"', "height": '"10 mm"', "edge": '"1 mm"', "rise": '"100 nm"'}
+FLAT = {"type": '"plate"', "width": '"10 mm"', "height": '"10 mm"'}
 BOX = {"type": '"plate"', "width": '"4 mm"', "height": '"4 mm"', "thickness": '"2 um"'}
 # Instead of numbers.
 FILED = '# or of a file beside this one: { file = "part.stl", unit = "mm" }'
@@ -107,7 +108,7 @@ def _bench(name: str, kind: Kind) -> str:
     for parameter in known.values():
         if Mesh in members(parameter.hint):
             end = lines if _through(known) else tables
-            end += ["", *_comment(parameter.text), *_sample(parameter, _through(known))]
+            end += ["", *_comment(parameter.text), *_sample(parameter, known)]
         else:
             lines += ["", *_comment(parameter.text), _value(parameter)]
     return "\n".join([*lines, *tables]) + "\n"
@@ -140,9 +141,11 @@ def _value(parameter: Parameter) -> str:
     return f"# {_line(parameter.name, value)}"
 
 
-def _sample(parameter: Parameter, through: bool) -> list[str]:
-    """The table of a sample: a step to reflect off, or a thin box to look through."""
-    mesh = ", ".join(f"{key} = {value}" for key, value in (BOX if through else STEP).items())
+def _sample(parameter: Parameter, known: dict[str, Parameter]) -> list[str]:
+    """The table of a sample: a step to reflect off, a flat for a cavity, or a thin box to look through."""
+    through = _through(known)
+    shape = BOX if through else FLAT if "gap" in known else STEP
+    mesh = ", ".join(f"{key} = {value}" for key, value in shape.items())
     if through:  # the bench knows what it is made of
         return [FILED, f"{parameter.name} = {{ {mesh} }}"]
     return [f"[bench.{parameter.name}]", FILED, f"mesh = {{ {mesh} }}", 'interface = "Mirror"']
