@@ -38,6 +38,30 @@ def test_a_mesh_to_its_brdf(rods, tmp_path, capsys, extra):
     assert (out / "spectra.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.fixture
+def feathers(tmp_path):
+    (tmp_path / "feathers.csv").write_text("wavelength / nm,blue\n400,0.4\n500,0.2\n600,0.1\n")
+    return tmp_path / "feathers.csv"
+
+
+def test_measured_spectra_are_laid_over(rods, feathers, tmp_path, capsys):
+    out = tmp_path / "out"
+    given = ["--unit", "um", "--out", str(out), *SHORT, "--rays", "1", "200", "--measured", str(feathers)]
+    assert cli.main(["brdf", str(rods), *given]) == 0
+    assert "spectra.png, measured.png" in capsys.readouterr().out
+    assert {file.name for file in out.iterdir()} == {*commands.FILES, "measured.png"}
+    feathers.write_text("blue\n1\n")
+    assert cli.main(["brdf", str(rods), *given]) == cli.FAILURE
+    assert "expected a column of wavelengths" in capsys.readouterr().err
+
+
+def test_measured_spectra_beside_layers(feathers, tmp_path, capsys):
+    given = ["--rod", "1.6", "--host", "1.5", "--method", "multilayer", "--measured", str(feathers), *SHORT]
+    assert cli.main(["lattice", "--rows", "2", "--out", str(tmp_path / "out"), *given]) == 0
+    assert "reflectance.csv, measured.png" in capsys.readouterr().out
+    assert (tmp_path / "out" / "measured.png").read_bytes()[:4] == b"\x89PNG"
+
+
 def test_lattices_in_one_call(tmp_path, capsys, monkeypatch):
     # processes start for seconds; test_sweeps has some
     monkeypatch.setattr(sweeps, "ProcessPoolExecutor", lambda *_, **__: ThreadPoolExecutor(1))

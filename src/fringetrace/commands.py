@@ -22,6 +22,7 @@ Lines = list[tuple[str, str]]
 WAVELENGTHS = ("300 nm", "700 nm", "401")
 FILES = ("brdf.nc", "brdf.csv", "spectra.png")
 LAYERS = "reflectance.csv"
+MEASURED = "measured.png"
 # Part of the largest extent up to which a part counts as flat.
 FLAT = 1e-6
 
@@ -40,6 +41,7 @@ def brdf(
     reflectance: float = 1.0,
     hemisphere: int = 0,
     feature: str | None = None,
+    measured: Path | None = None,
     threads: int | None = None,
 ) -> Lines:
     """BRDF of a mesh of mirrors, its normal along z: spectra from each angle into each.
@@ -72,6 +74,9 @@ def brdf(
     feature
         Radius of the roundest small parts, to say what rays are worth. Default: half of the least extent
         of any connected part of the mesh.
+    measured
+        CSV file of measured reflectances, to be laid over the spectra towards the mirror's direction
+        (measured.png); a column of wavelengths, then one a sample.
     threads
         Default: one for each core.
     """
@@ -98,13 +103,13 @@ def brdf(
         )  # fmt: skip
         worth = validity(radius, float(table.wavelength.max()), CONDUCTOR)
         table.attrs |= worth.attributes
-        _write(table, part)
+        written = _write(table, part, measured)
     guess = "" if feature else f" (radius {radius:.3g} m estimated from the mesh's parts; --feature says it)"
     return [
         ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
         *_powers(table),
         ("rays", f"{worth}{guess}"),
-        ("written", f"{folder}: {', '.join(FILES)}"),
+        ("written", f"{folder}: {', '.join(written)}"),
     ]
 
 
@@ -127,6 +132,7 @@ def lattice(
     acceptance: str = "0.64 deg",
     rays: int = 2000,
     method: str = "rays",
+    measured: Path | None = None,
     scheduler: str | None = None,
 ) -> Lines:
     """BRDF of lattices of rods, for every combination of the values given.
@@ -161,6 +167,8 @@ def lattice(
         beside the rigorous one, of one lattice: reflectance.csv alone.
     rays
         Across a lattice.
+    measured
+        CSV file of measured reflectances, as in `fringetrace brdf`.
     scheduler
         Address of a Dask scheduler. Default: this machine's cores.
     """
@@ -183,21 +191,21 @@ def lattice(
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     waves = _steps(wavelengths, "--wavelengths", parse_length)
     if method == "multilayer":
-        return _endless(base, axes, theta[theta >= 0.0], waves, out)
+        return _endless(base, axes, theta[theta >= 0.0], waves, out, measured)
     table = studies.study(
         base, axes, theta, theta, waves, rays=rays,
         half_angle=parse_angle(acceptance, "--acceptance"), method=method,
         folder=os.fspath(out / "cells"), scheduler=scheduler,
     )  # fmt: skip
     with measurement.staged(out) as part:
-        _write(table, part)
+        written = _write(table, part, measured)
     count = int(np.prod([len(values) for values in axes.values()]))
     same = ", ".join(f"{name} {values[0]}" for name, values in spoken.items() if name not in axes)
     return [
         ("lattices", f"{count} of {', '.join(axes) or 'one kind'}; {same}"),
         *_powers(table),
         ("rays", f"at worst: {table.attrs['validity']}"),
-        ("written", f"{out}: {', '.join(FILES)}"),
+        ("written", f"{out}: {', '.join(written)}"),
     ]
 
 
@@ -245,9 +253,16 @@ def _medium(text: str | None) -> Any:
         return text
 
 
-def _endless(base: Lattice, axes: dict[str, Any], theta: FloatArray, waves: FloatArray, out: Path) -> Lines:
+def _endless(
+    base: Lattice,
+    axes: dict[str, Any],
+    theta: FloatArray,
+    waves: FloatArray,
+    out: Path,
+    measured: Path | None,
+) -> Lines:
     """Specular spectra of endless rows, layered and rigorous."""
-    from fringetrace import measurement, studies, tables
+    from fringetrace import measurement, studies, tables, views
 
     if axes:
         raise ValueError(f"--method multilayer: expected one lattice, got several of {', '.join(axes)}")
@@ -257,12 +272,17 @@ def _endless(base: Lattice, axes: dict[str, Any], theta: FloatArray, waves: Floa
     table = tables.labelled([one.values for one in both], axes, name="reflectance", unit="1")
     with measurement.staged(out) as part:
         tables.write_rows(table, part / LAYERS)
+        if measured is not None:
+            first = table.isel(theta_i=0)
+            title = f"light from {float(first.theta_i) / degree:.3g}°"
+            ax = views.spectra(first, measured=tables.read_csv(measured), title=title)
+            views.save(ax, part / MEASURED)
     top = [one.isel(one.argmax(...)) for one in both]
     said = (f"{float(one):.3g} at {float(one.wavelength) * 1e9:.4g} nm" for one in top)
     return [
         ("largest", "layers {}, rods {}".format(*said)),
         ("rays", str(both[0].attrs["validity"])),
-        ("written", f"{out}: {LAYERS}"),
+        ("written", f"{out}: {LAYERS}" + (f", {MEASURED}" if measured else "")),
     ]
 
 
@@ -289,13 +309,18 @@ def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
     return np.linspace(parse(first, what), parse(last, what), int(count))
 
 
-def _write(table: DataArray, folder: Path) -> None:
-    """brdf.nc, brdf.csv, spectra.png."""
+def _write(table: DataArray, folder: Path, measured: Path | None) -> tuple[str, ...]:
+    """brdf.nc, brdf.csv, spectra.png, and measured.png if there is something to lay over."""
     from fringetrace import tables, views
 
+    overlaid = None if measured is None else tables.read_csv(measured)
     tables.write_netcdf(table, folder / "brdf.nc")
     tables.write_rows(table, folder / "brdf.csv")
-    views.save(views.spectra(table), folder / "spectra.png")
+    views.save(views.overview(table), folder / "spectra.png")
+    if overlaid is None:
+        return FILES
+    views.save(views.mirror_spectra(table, overlaid), folder / MEASURED)
+    return (*FILES, MEASURED)
 
 
 def _powers(table: DataArray) -> Lines:
