@@ -16,9 +16,9 @@ from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
 from fringetrace import commands
-from fringetrace.drawing import unit_of
+
 from fringetrace.mesh import Mesh
-from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length
+from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length, unit_of
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.drawing import opengl, picture, show, unit_of
-from fringetrace.waves import Array, FloatArray, checked_wavelength
+from fringetrace.exhibits import picture, show
+from fringetrace.offscreen import opengl
+from fringetrace.waves import Array, FloatArray, checked_wavelength, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
