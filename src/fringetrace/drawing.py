@@ -162,11 +162,13 @@ def _legend(
     """Names beside a dash in their colour, one below the other."""
     for row, (name, colour) in enumerate(entries):
         height = top - 0.037 * row
-        for text, at, ink in (("——", left, colour), (_short(name), left + 0.04, INK)):
+        for text, at, y, ink, size in (
+            ("–", left, height - 0.022, colour, 36),
+            (_short(name), left + 0.04, height, INK, 11),
+        ):
             plotter.add_text(
-                text, position=(at, height), viewport=True, color=ink, font_size=11,
-                name=f"{what} {row} {at}",
-            )  # fmt: skip
+                text, position=(at, y), viewport=True, color=ink, font_size=size, name=f"{what} {row} {at}"
+            )
 
 
 def _short(name: str) -> str:
@@ -257,24 +259,27 @@ def _round_bounds(bounds: Sequence[float]) -> tuple[list[float], list[int]]:
     return box.ravel().tolist(), [int(n) for n in last - first + 1]
 
 
-def clip(plotter: Plotter, normal: FloatArray, origin: FloatArray) -> None:
+def clip(plotter: Plotter, normal: FloatArray | None, origin: FloatArray | None) -> None:
     """Hide all that is on the side of a plane that its normal points to.
 
     Parameters
     ----------
     plotter : pyvista.Plotter
-    normal, origin : (3,) float64, in the unit of the stage
+    normal, origin : (3,) float64, in the unit of the stage, or None
+        None: hide nothing any more.
     """
     from pyvista import _vtk
 
-    plane = _vtk.vtkPlane()
-    plane.SetNormal(*-np.asarray(normal, dtype=np.float64))
-    plane.SetOrigin(*np.asarray(origin, dtype=np.float64))
+    planes = _vtk.vtkPlaneCollection()
+    if normal is not None and origin is not None:
+        plane = _vtk.vtkPlane()
+        plane.SetNormal(*-np.asarray(normal, dtype=np.float64))
+        plane.SetOrigin(*np.asarray(origin, dtype=np.float64))
+        planes.AddItem(plane)
     for actor in plotter.actors.values():
         mapper = getattr(actor, "mapper", None)
         if hasattr(mapper, "SetClippingPlanes") and hasattr(mapper, "dataset"):
-            mapper.RemoveAllClippingPlanes()
-            mapper.AddClippingPlane(plane)
+            mapper.SetClippingPlanes(planes)
 
 
 def draw(plotter: Plotter, view: View) -> PolyData | None:

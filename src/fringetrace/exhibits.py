@@ -219,11 +219,21 @@ def show(
 def _interactive(scene: Scene | Bench, paths: Several, looks: Looks) -> View:
     """A view with phases at many wavelengths, and of a bench with an image for each phase step."""
     found = view(scene, paths, sweep=SWEEP, **looks)
-    if isinstance(scene, Bench) and looks.get("image") is None and found.strands is not None:
-        wavelength = looks.get("wavelength")
-        if wavelength is not None:
-            return replace(found, frames=_binned(scene.phase_steps(wavelength, STEPS)))
-    return found
+    frames, wavelength = None, looks.get("wavelength")
+    if isinstance(scene, Bench) and looks.get("image") is None and wavelength is not None:
+        frames = _binned(scene.phase_steps(wavelength, STEPS))
+    panels = [
+        panel if panel.name != "CCD" else replace(panel, image=_shown(panel.image, frames))
+        for panel in found.stage.panels
+    ]
+    return replace(found, stage=replace(found.stage, panels=tuple(panels)), frames=frames)
+
+
+def _shown(image: FloatArray | None, frames: FloatArray | None) -> FloatArray | None:
+    """What the CCD shows at first."""
+    if frames is not None:
+        return np.asarray(frames[0], dtype=np.float64)
+    return None if image is None else np.asarray(_binned(image[None])[0], dtype=np.float64)
 
 
 def _binned(images: FloatArray) -> FloatArray:

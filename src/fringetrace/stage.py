@@ -20,7 +20,7 @@ AZIMUTH, ELEVATION = np.radians([30.0, 25.0])
 # Part of the scene's width that the scale bar is long, at most.
 BAR = 0.25
 # A letter's width and a line's height, parts of the scene's diagonal in the view.
-LETTER, LINE = 0.014, 0.035
+LETTER, LINE = 0.017, 0.035
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,13 +285,14 @@ def labels(stage: Stage) -> list[tuple[str, FloatArray, bool]]:
     taken = [np.concatenate([plane.min(axis=0), plane.max(axis=0)]) for _, plane, _ in flat]
     found = []
     for name, plane, points in flat:
-        half, gap = 0.5 * LETTER * size * len(name), 0.01 * size
-        best: tuple[float, float] | None = None
+        half, gap = 0.5 * LETTER * size * len(name), 0.012 * size
+        best = np.inf
         for number, (spot, above) in enumerate(_spots(plane, gap, half)):
             low = spot[1] if above else spot[1] - LINE * size
             box = np.array([spot[0] - half, low, spot[0] + half, low + LINE * size])
-            cost = (_overlap(box, taken), float(number))
-            if best is None or cost < best:
+            away = np.linalg.norm(plane - spot, axis=1).min() - (half if number > 1 else 0.0)
+            cost = _overlap(box, taken) / (2.0 * half * LINE * size) + 2.0 * away / size
+            if cost < best:
                 best, chosen = cost, (spot, above, box)
         spot, above, box = chosen
         taken.append(box)
