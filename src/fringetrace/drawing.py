@@ -74,7 +74,7 @@ def legs(view: View) -> PolyData:
     Returns
     -------
     pyvista.PolyData
-        In the unit of the stage; `value` at points is what is coloured, `strand` at cells says whose leg it is.
+        In the unit of the stage; `value` at points is what is coloured, `strand` at cells is whose leg it is.
     """
     import pyvista
 
@@ -156,9 +156,7 @@ def _draw_surfaces(plotter: Plotter, stage: Stage) -> None:
     _legend(plotter, stage.legend, 0.8, 0.955, "surface")
 
 
-def _legend(
-    plotter: Plotter, entries: Sequence[tuple[str, str]], left: float, top: float, what: str
-) -> None:
+def _legend(plotter: Plotter, entries: Sequence[tuple[str, str]], left: float, top: float, what: str) -> None:
     """Names beside a dash in their colour, one below the other."""
     for row, (name, colour) in enumerate(entries):
         height = top - 0.037 * row
@@ -236,7 +234,9 @@ def _draw_ends(plotter: Plotter, stage: Stage) -> None:
         way = (arrow.tip - arrow.tail) / metres
         shape = pyvista.Arrow(start=arrow.tail / metres, direction=way, scale=float(np.linalg.norm(way)))
         plotter.add_mesh(shape, color=SOURCE, pickable=False)
-    plotter.add_mesh(pyvista.Line(*(stage.bar / metres)), color=INK, line_width=4.0, pickable=False)
+    plotter.add_mesh(
+        pyvista.Line(*(stage.bar / metres)), color=INK, line_width=4.0, pickable=False, name="bar"
+    )
     _label(plotter, stage.bar.mean(axis=0) / metres, stage.bar_label, "top", 20)
 
 
@@ -276,9 +276,9 @@ def clip(plotter: Plotter, normal: FloatArray | None, origin: FloatArray | None)
         plane.SetNormal(*-np.asarray(normal, dtype=np.float64))
         plane.SetOrigin(*np.asarray(origin, dtype=np.float64))
         planes.AddItem(plane)
-    for actor in plotter.actors.values():
+    for name, actor in plotter.actors.items():
         mapper = getattr(actor, "mapper", None)
-        if hasattr(mapper, "SetClippingPlanes") and hasattr(mapper, "dataset"):
+        if name != "bar" and hasattr(mapper, "SetClippingPlanes") and hasattr(mapper, "dataset"):
             mapper.SetClippingPlanes(planes)
 
 

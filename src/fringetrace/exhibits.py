@@ -10,6 +10,7 @@ from typing import TypedDict, Unpack
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace import exports, pages
 from fringetrace.arms import Mark
 from fringetrace.bench import Bench
 from fringetrace.drawing import View
@@ -48,18 +49,20 @@ class Looks(TypedDict, total=False):
     tubes: float
 
 
-def few(shape: tuple[int, int]) -> tuple[int, int]:
+def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
     """A grid of rays of the same proportions, few enough to look at.
 
     Parameters
     ----------
     shape : (rows, columns)
+    most : int
+        Rays along the longer side.
 
     Returns
     -------
     (rows, columns)
     """
-    rows, columns = (max(1, round(DRAWN * n / max(shape))) for n in shape)
+    rows, columns = (max(1, round(most * n / max(shape))) for n in shape)
     return rows, columns
 
 
@@ -214,6 +217,57 @@ def show(
         As `view`.
     """
     opened(_interactive(scene, paths, looks), size)
+
+
+def page(
+    scene: Scene | Bench,
+    paths: Several,
+    path: str | os.PathLike[str],
+    *,
+    title: str = "fringetrace",
+    **looks: Unpack[Looks],
+) -> None:
+    """One HTML file with a scene to turn, to re-phase, to click on; it needs neither network nor server.
+
+    Parameters
+    ----------
+    scene : Scene or Bench
+    paths : as in `view`
+    path : path
+    title : str
+    **looks
+        What it begins with, see `view`; clipping and tubes are for pictures and windows.
+
+    Raises
+    ------
+    ImportError
+        If plotly is missing; says what to install.
+    ValueError
+        As `view`.
+    """
+    pages.page(_interactive(scene, paths, looks), path, title)
+
+
+def export(
+    scene: Scene | Bench, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
+) -> None:
+    """Surfaces and rays for other programs: .glb, .ply or .vtp, in metres.
+
+    Parameters
+    ----------
+    scene : Scene or Bench
+    paths : as in `view`
+    path : path
+        Its suffix says the kind, see `exports.export`.
+    **looks
+        Colours and the like, see `view`.
+
+    Raises
+    ------
+    ValueError
+        As `view`; for another suffix.
+    """
+    exports.export(view(scene, paths, **looks), path)
 
 
 def _interactive(scene: Scene | Bench, paths: Several, looks: Looks) -> View:

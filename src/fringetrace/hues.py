@@ -119,7 +119,9 @@ def scale(strands: Strands, way: str, unit: str, metres: float) -> Scale:
         names = tuple(f"beam {number + 1}" for number in range(int(strands.beam.max(initial=0)) + 1))
         return Scale("beam", tuple(COLOURS[n % len(COLOURS)] for n in range(len(names))), names=names)
     if way == "fate":
-        return Scale("where paths end", FATES, names=tuple(fate.name.lower() for fate in Fate))
+        fates = np.unique(strands.fate).tolist()
+        names = tuple(Fate(fate).name.lower() for fate in fates)
+        return Scale("where paths end", tuple(FATES[fate] for fate in fates), names=names)
     if way == "bounce":
         return Scale("surfaces met before", VIRIDIS, 0.0, max(1.0, float(strands.bounces.max(initial=0))))
     if way == "phase":
@@ -160,6 +162,8 @@ def values(
         flat = np.mod(turns[path, bounce + 1], 1.0)
     elif way == "bounce":
         flat = bounce.astype(np.float64)
+    elif way == "fate":
+        flat = np.unique(strands.fate, return_inverse=True)[1].astype(np.float64)[path]
     else:
         flat = np.asarray(getattr(strands, way), dtype=np.float64)[path]
     return np.repeat(flat[:, None], 2, axis=1)

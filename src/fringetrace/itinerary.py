@@ -74,8 +74,9 @@ def told(shown: Strands, number: int, wavelength: int | None = None, step: float
         lines.append(_leg(shown, number, bounce, metres))
     if fate == Fate.DETECTED:
         lines.append(f"{bounces + 1}. CCD at {_place(points[last], metres)}")
-        lines.append(_leg(shown, number, bounces, metres))
-    lines.append(f"optical path {opl[last] / metres:.9g} {unit}")
+        lines.append(_leg(shown, number, bounces, metres).partition(";")[0])
+    where = " (to its plane of focus)" if fate == Fate.DETECTED and shown.focused else ""
+    lines.append(f"optical path {opl[last] / metres:.9g} {unit}{where}")
     lines += _phase(shown, number, last, wavelength, step)
     return "\n".join([*lines, f"power {shown.power[number]:.6g} of the launched"])
 
@@ -97,4 +98,4 @@ def _phase(shown: Strands, number: int, last: int, wavelength: int | None, step:
     at = shown.chosen if wavelength is None else wavelength
     turns = shown.phase[at, number, last] + shown.steps[number, last] * step / (2.0 * np.pi)
     turns = float(np.mod(turns, 1.0))
-    return [f"phase {turns:.4f} × 2π = {360.0 * turns:.1f}° at {shown.wavelengths[at] / nm:.6g} nm"]
+    return [f"phase {turns:.4f} turns = {360.0 * turns:.1f}° at {shown.wavelengths[at] / nm:.6g} nm"]

@@ -97,9 +97,9 @@ def contents(view: View) -> dict[str, Any]:
     traces += [_panel(panel, stage.metres) for panel in stage.panels if panel.image is None]
     traces += [_arrow(arrow.tail / stage.metres, arrow.tip / stage.metres) for arrow in stage.arrows]
     data: dict[str, Any] = {"steps": STEPS if view.frames is None else len(view.frames)}
-    for chip in chips:
+    for panel in chips:
         data["chip"] = len(traces)
-        traces.append(_image(chip, stage.metres))
+        traces.append(_image(panel, stage.metres))
     if view.frames is not None and chips:
         most = float(view.frames.max()) or 1.0
         data["frames"] = _packed(np.round(255.0 * view.frames / most), "u1")
@@ -166,8 +166,8 @@ def _arrow(tail: FloatArray, tip: FloatArray) -> dict[str, Any]:
     place = {name: [float(x)] for name, x in zip("xyz", tip, strict=True)}
     way = {name: [float(x)] for name, x in zip("uvw", tip - tail, strict=True)}
     return {
-        "type": "cone", **place, **way, "anchor": "tip", "sizemode": "raw", "sizeref": 1.0, "showscale": False,
-        "colorscale": [[0, "#E69F00"], [1, "#E69F00"]], "name": "direction of light", "hoverinfo": "name",
+        "type": "cone", **place, **way, "anchor": "tip", "sizemode": "raw", "sizeref": 1.0,
+        "showscale": False, "colorscale": [[0, "#E69F00"], [1, "#E69F00"]], "name": "direction of light", "hoverinfo": "name",
     }  # fmt: skip
 
 
@@ -177,8 +177,8 @@ def _bar(ends: FloatArray, label: str) -> dict[str, Any]:
     place = {name: column.tolist() for name, column in zip("xyz", points.T, strict=True)}
     return {
         "type": "scatter3d", **place, "mode": "lines+text", "text": ["", label, ""],
-        "textposition": "bottom center", "line": {"color": "#000000", "width": 6}, "name": f"scale bar, {label}",
-        "hoverinfo": "name", "showlegend": True,
+        "textposition": "bottom center", "line": {"color": "#000000", "width": 6},
+        "name": f"scale bar, {label}", "hoverinfo": "name", "showlegend": True,
     }  # fmt: skip
 
 
@@ -187,8 +187,9 @@ def _lines() -> list[dict[str, Any]]:
     bar = {"x": 0.0, "xanchor": "left", "len": 0.6, "thickness": 16, "title": {"side": "top"}}
     return [
         {
-            "type": "scatter3d", "mode": "lines", "name": "rays", "x": [], "y": [], "z": [], "showlegend": True,
-            "line": {"width": 2.5, "color": [], "colorbar": bar, "showscale": True}, "hoverinfo": "none",
+            "type": "scatter3d", "mode": "lines", "name": "rays", "x": [], "y": [], "z": [],
+            "showlegend": True, "hoverinfo": "none",
+            "line": {"width": 2.5, "color": [], "colorbar": bar, "showscale": True},
         },
         {
             "type": "scatter3d", "mode": "lines", "name": "ray clicked on", "x": [], "y": [], "z": [],
@@ -235,7 +236,10 @@ def _way(view: View, shown: Strands, way: str) -> dict[str, Any]:
         names = [name.replace("\n", "<br>") for name in names]
         data |= {"low": -0.5, "high": len(names) - 0.5, "names": names, "ticks": list(range(len(names)))}
     if way == "bounce":
-        data |= {"ticks": list(range(int(found.high) + 1)), "names": [str(n) for n in range(int(found.high) + 1)]}
+        data |= {
+            "ticks": list(range(int(found.high) + 1)),
+            "names": [str(n) for n in range(int(found.high) + 1)],
+        }
     if way != "phase":
         data["values"] = _packed(values(shown, way, view.stage.metres), "f4")
     return data
@@ -259,11 +263,15 @@ def _colorscale(found: Scale) -> list[list[Any]]:
 def _layout(unit: str) -> dict[str, Any]:
     _, _, eye = axes_of_view()
     axes = {
-        f"{name}axis": {"title": {"text": f"{name} / {unit}"}, "backgroundcolor": "#f6f6f6", "gridcolor": "#bbb"}
+        f"{name}axis": {
+            "title": {"text": f"{name} / {unit}"},
+            "backgroundcolor": "#f6f6f6",
+            "gridcolor": "#bbb",
+        }
         for name in "xyz"
     }
     camera = {
-        "eye": dict(zip("xyz", (1.3 * eye).tolist(), strict=True)), "up": {"x": 0, "y": 0, "z": 1},
+        "eye": dict(zip("xyz", (1.1 * eye).tolist(), strict=True)), "up": {"x": 0, "y": 0, "z": 1},
         "projection": {"type": "orthographic"},
     }  # fmt: skip
     return {

@@ -208,7 +208,9 @@ def _ends(
         panels.append(Panel("CCD", _rectangle(ccd), None if image is None else checked_image(image, ccd)))
     if image is not None and not ccds:
         raise ValueError("image: expected paths traced onto a CCD that can show it, got none")
-    return tuple(panels), tuple(arrow for arrow in arrows if np.linalg.norm(arrow.tip - arrow.tail) > 0.05 * size)
+    return tuple(panels), tuple(
+        arrow for arrow in arrows if np.linalg.norm(arrow.tip - arrow.tail) > 0.05 * size
+    )
 
 
 def checked_image(image: Any, ccd: CCD) -> FloatArray:

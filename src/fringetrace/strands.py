@@ -55,6 +55,8 @@ class Strands:
         Names.
     rays : int
         Rays that there are; as many as differ in `beam` and `ray` are shown.
+    focused : bool
+        Whether the CCD is focused on another plane than its own.
     """
 
     points: FloatArray
@@ -76,6 +78,7 @@ class Strands:
     surfaces: tuple[str, ...]
     routes: tuple[str, ...]
     rays: int
+    focused: bool = False
 
     def __len__(self) -> int:
         return len(self.ray)
@@ -180,9 +183,7 @@ def _routes(parts: Sequence[Paths]) -> tuple[tuple[str, ...], list[npt.NDArray[n
     return routes, [np.array([place[t] for t in texts], dtype=np.int64)[which] for texts, which in kinds]
 
 
-def _sampled(
-    paths: Paths, route: npt.NDArray[np.int64], most: int, every: bool
-) -> npt.NDArray[np.int64]:
+def _sampled(paths: Paths, route: npt.NDArray[np.int64], most: int, every: bool) -> npt.NDArray[np.int64]:
     """Rows of some rays; each ray on one path, and those in turn on one after the other, unless `every`."""
     seen = paths.fate == Fate.DETECTED
     rows = np.flatnonzero(seen) if seen.any() and not every else np.arange(len(paths))
@@ -204,13 +205,14 @@ def _strands(
     paths: Paths, wavelength: float | None, reference: Mark | None, sweep: int, onward: float
 ) -> Strands:
     """All of some paths of one beam."""
-    assert paths.points is not None and paths.surface is not None
+    assert paths.points is not None
+    assert paths.surface is not None
     if wavelength is not None:
         paths = at_wavelength(paths, checked_wavelength(wavelength))
     base = paths.wavelength if wavelength is None else wavelength
     wavelengths, chosen = _sweep(paths, base, sweep)
     through, medium = _media(paths)
-    way = np.nan_to_num(np.linalg.norm(np.diff(paths.points, axis=1), axis=2))
+    way = _ways(paths)
     opl = _opl(paths, way, medium, base)
     phases = []
     for one in wavelengths:
@@ -228,7 +230,19 @@ def _strands(
         ray=paths.ray, fate=paths.fate.astype(np.int64), bounces=paths.bounces.astype(np.int64),
         route=np.zeros(len(paths), dtype=np.int64), power=np.abs(paths.amplitude) ** 2,
         surfaces=tuple(surface.name for surface in paths.scene.surfaces), routes=(), rays=0,
+        focused=isinstance(paths.ccd, CCD) and paths.ccd.focus != 0.0,
     )  # fmt: skip
+
+
+def _ways(paths: Paths) -> FloatArray:
+    """Length of each leg, (m, k - 1) metres; negative back from the last hit to the CCD's plane of focus."""
+    assert paths.points is not None
+    legs = np.diff(paths.points, axis=1)
+    way = np.linalg.norm(legs, axis=2)
+    seen = np.flatnonzero(paths.fate == Fate.DETECTED)
+    last = paths.bounces[seen]
+    way[seen, last] = (legs[seen, last] * paths.direction[seen]).sum(axis=1)
+    return np.nan_to_num(way)
 
 
 def _sweep(paths: Paths, base: float | None, count: int) -> tuple[FloatArray, int]:
@@ -251,10 +265,14 @@ def _sweep(paths: Paths, base: float | None, count: int) -> tuple[FloatArray, in
 
 def _media(paths: Paths) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
     """Whether light went on through each surface, and the number of the medium on each leg."""
-    assert paths.points is not None and paths.surface is not None and paths.triangle is not None
+    assert paths.points is not None
+    assert paths.surface is not None
+    assert paths.triangle is not None
     scene, (rows, bounces) = paths.scene, paths.surface.shape
     numbers = {medium: number for number, medium in enumerate(materials(scene))}
-    beside = np.array([[numbers[s.front or scene.around], numbers[s.back or scene.around]] for s in scene.surfaces])
+    beside = np.array(
+        [[numbers[s.front or scene.around], numbers[s.back or scene.around]] for s in scene.surfaces]
+    )
     parts = np.array([surface.boundary for surface in scene.surfaces])
     through = np.zeros((rows, bounces), dtype=bool)
     medium = np.full((rows, bounces + 1), numbers[scene.around], dtype=np.int64)
@@ -316,7 +334,8 @@ def _opl(paths: Paths, way: FloatArray, medium: Array, wavelength: float | None)
 
 def _turned(paths: Paths, through: Array) -> FloatArray:
     """By how much surfaces turned the phase up to each point, (m, k) radians; 0 for polarised light."""
-    assert paths.surface is not None and paths.points is not None
+    assert paths.surface is not None
+    assert paths.points is not None
     turned = np.zeros(paths.points.shape[:2])
     if paths.field is not None:
         return turned
@@ -331,7 +350,8 @@ def _turned(paths: Paths, through: Array) -> FloatArray:
 
 def _steps(paths: Paths, reference: Mark | None) -> npt.NDArray[np.int64]:
     """How often a phase step turns the light at each point."""
-    assert paths.points is not None and paths.surface is not None
+    assert paths.points is not None
+    assert paths.surface is not None
     steps = np.ones(paths.points.shape[:2], dtype=np.int64)
     if reference is None:
         return steps

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.exhibits import picture, show
+from fringetrace.exhibits import export, page, picture, show
+from fringetrace.itinerary import itinerary
 from fringetrace.offscreen import opengl
 from fringetrace.waves import Array, FloatArray, checked_wavelength, unit_of
 
@@ -20,9 +21,12 @@ if TYPE_CHECKING:
     from fringetrace.tables import DataArray
 
 __all__ = [
+    "export",
     "height",
     "interferogram",
+    "itinerary",
     "opengl",
+    "page",
     "phase",
     "picture",
     "residual",

@@ -115,9 +115,16 @@ class Window:
         assert shown is not None
         self.picked = number
         text = told(shown, number, self.view.wavelength, self.view.step)
-        self.plotter.add_text(
-            text, position=(0.01, 0.03), viewport=True, color="black", font_size=8, name="path", font="courier"
+        note = self.plotter.add_text(
+            text,
+            position=(0.01, 0.03),
+            viewport=True,
+            color="black",
+            font_size=8,
+            name="path",
+            font="courier",
         )
+        note.prop.background_color, note.prop.background_opacity = "white", 0.85
         data = legs(self.view)
         mine = np.flatnonzero(np.asarray(data.cell_data["strand"]) == number)
         if len(mine):
@@ -194,7 +201,9 @@ def _sliders(window: Window) -> None:
     known = shown.wavelengths / nm
     wanted: list[tuple[str, Any, float, float, float, str]] = []
     if len(known):
-        wanted.append(("phase step, degrees", window.step, 0.0, 360.0, float(np.degrees(window.view.step)), "%.0f"))
+        wanted.append(
+            ("phase step, degrees", window.step, 0.0, 360.0, float(np.degrees(window.view.step)), "%.0f")
+        )
     if len(known) > 1:
         at = float(known[shown.chosen])
         wanted.append(("wavelength, nm", window.wavelength, float(known[0]), float(known[-1]), at, "%.0f"))
@@ -206,7 +215,9 @@ def _sliders(window: Window) -> None:
         height = LOWEST + APART * row
         window.plotter.add_slider_widget(
             act, (low, high), value=value, title=title, pointa=(LEFT, height), pointb=(RIGHT, height),
-            color="black", style="modern", title_height=0.018, fmt=digits, interaction_event="always",
+            color="black", style="modern", title_height=0.018,
+            slider_width=0.02, tube_width=0.008,
+            fmt=digits, interaction_event="always",
         )  # fmt: skip
 
 
