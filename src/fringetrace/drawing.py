@@ -19,11 +19,13 @@ if TYPE_CHECKING:
 Plotter = Any  # mypy does not see through the decorators of pyvista's
 BAR = {
     "vertical": False, "position_y": 0.03, "width": 0.3, "height": 0.07, "fmt": "%.3g",
-    "title_font_size": 20, "label_font_size": 18, "color": "black",
+    "color": "black",
 }  # fmt: skip
 SOURCE, CHIP, INK = "#E69F00", "#202020", "black"
 # Letters of a legend's name at most: longer ones would run into the scene.
 LETTERS = 44
+# Pixels, for which sizes of fonts are meant.
+WIDTH = 1600
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +145,12 @@ def _draw_surfaces(plotter: Plotter, stage: Stage) -> None:
         if solid.relief:
             z = solid.vertices[:, 2] - 0.5 * (solid.vertices[:, 2].min() + solid.vertices[:, 2].max())
             unit, height_unit = unit_of(float(np.ptp(z)))
-            bar = {**BAR, "n_labels": 2, "title": f"height of the {solid.name} / {unit}", "position_x": 0.04}
+            bar = {
+                **_bar(plotter),
+                "n_labels": 2,
+                "title": f"height of the {solid.name} / {unit}",
+                "position_x": 0.04,
+            }
             plotter.add_mesh(
                 mesh, scalars=z / height_unit, cmap="viridis", scalar_bar_args=bar, lighting=False,
                 pickable=False,
@@ -165,8 +172,29 @@ def _legend(plotter: Plotter, entries: Sequence[tuple[str, str]], left: float, t
             (_short(name), left + 0.04, height, INK, 11),
         ):
             plotter.add_text(
-                text, position=(at, y), viewport=True, color=ink, font_size=size, name=f"{what} {row} {at}"
+                text,
+                position=(at, y),
+                viewport=True,
+                color=ink,
+                font_size=sized(plotter, size),
+                name=f"{what} {row} {at}",
             )
+
+
+def sized(plotter: Plotter, size: int) -> int:
+    """A font's size in proportion to the picture.
+
+    Parameters
+    ----------
+    plotter : pyvista.Plotter
+    size : int
+        In a picture as wide as `WIDTH`.
+
+    Returns
+    -------
+    int
+    """
+    return max(4, round(size * plotter.window_size[0] / WIDTH))
 
 
 def _short(name: str) -> str:
@@ -201,12 +229,24 @@ def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
     plotter.add_mesh(
         data, scalars="value", cmap=_listed(found.table()), clim=clim, line_width=1.5, name="rays",
         show_scalar_bar=not found.names, lighting=view.radius > 0.0, copy_mesh=False,
-        scalar_bar_args={**BAR, **several, "title": title, "position_x": 0.02, "position_y": 0.86},
+        scalar_bar_args={**_bar(plotter), **several, "title": title, "position_x": 0.02, "position_y": 0.86},
     )  # fmt: skip
     caption = f"{strands.caption}; colours: {found.title}" if found.names else strands.caption
-    plotter.add_text(caption, position=(0.02, 0.955), viewport=True, color=INK, font_size=11, name="caption")
+    plotter.add_text(
+        caption,
+        position=(0.02, 0.955),
+        viewport=True,
+        color=INK,
+        font_size=sized(plotter, 11),
+        name="caption",
+    )
     _legend(plotter, list(zip(found.names, found.colours, strict=False)), 0.02, 0.915, "ray")
     return data
+
+
+def _bar(plotter: Plotter) -> dict[str, Any]:
+    sizes = {name: sized(plotter, size) for name, size in (("title_font_size", 20), ("label_font_size", 18))}
+    return {**BAR, **sizes}
 
 
 def _listed(table: Any) -> Any:
@@ -242,7 +282,7 @@ def _draw_ends(plotter: Plotter, stage: Stage) -> None:
 
 def _label(plotter: Plotter, spot: FloatArray, text: str, vertical: str, size: int) -> None:
     plotter.add_point_labels(
-        spot[None, :], [text], font_size=size, text_color=INK, shape=None, show_points=False,
+        spot[None, :], [text], font_size=sized(plotter, size), text_color=INK, shape=None, show_points=False,
         always_visible=True, justification_horizontal="center", justification_vertical=vertical,
         pickable=False,
     )  # fmt: skip
@@ -309,7 +349,7 @@ def draw(plotter: Plotter, view: View) -> PolyData | None:
     unit = stage.unit
     bounds, (nx, ny, nz) = _round_bounds(plotter.bounds)
     plotter.show_grid(
-        bounds=bounds, xtitle=f"x / {unit}", ytitle=f"y / {unit}", ztitle=f"z / {unit}", font_size=18,
+        bounds=bounds, xtitle=f"x / {unit}", ytitle=f"y / {unit}", ztitle=f"z / {unit}", font_size=sized(plotter, 18),
         color="#808080", n_xlabels=nx, n_ylabels=ny, n_zlabels=nz, fmt="%.4g", use_3d_text=False,
     )  # fmt: skip
     plotter.camera_position = "xz"

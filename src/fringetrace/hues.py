@@ -182,8 +182,7 @@ def look(surface: Surface) -> tuple[str, str, float]:
     colour : str
     opacity : float
     """
-    for kind, *found in KINDS:
+    for kind, name, colour, opacity in KINDS:
         if isinstance(surface.interface, kind):
-            name, colour, opacity = found
             return name, colour, opacity
     return ELEMENT if hasattr(surface.interface, "act") else OTHER

@@ -97,5 +97,5 @@ def _phase(shown: Strands, number: int, last: int, wavelength: int | None, step:
         return []
     at = shown.chosen if wavelength is None else wavelength
     turns = shown.phase[at, number, last] + shown.steps[number, last] * step / (2.0 * np.pi)
-    turns = float(np.mod(turns, 1.0))
+    turns = round(float(turns), 4) % 1.0
     return [f"phase {turns:.4f} turns = {360.0 * turns:.1f}° at {shown.wavelengths[at] / nm:.6g} nm"]

@@ -167,7 +167,8 @@ def _arrow(tail: FloatArray, tip: FloatArray) -> dict[str, Any]:
     way = {name: [float(x)] for name, x in zip("uvw", tip - tail, strict=True)}
     return {
         "type": "cone", **place, **way, "anchor": "tip", "sizemode": "raw", "sizeref": 1.0,
-        "showscale": False, "colorscale": [[0, "#E69F00"], [1, "#E69F00"]], "name": "direction of light", "hoverinfo": "name",
+        "showscale": False, "colorscale": [[0, "#E69F00"], [1, "#E69F00"]], "name": "direction of light",
+        "hoverinfo": "name",
     }  # fmt: skip
 
 

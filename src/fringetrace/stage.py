@@ -177,7 +177,8 @@ def _solids(
     if surfaces not in ("interface", "name"):
         raise ValueError(f"surfaces: expected 'interface' or 'name', got {surfaces!r}")
     chosen = None if relief is None else scene.index(relief)
-    solids, legend = [], {}
+    solids: list[Solid] = []
+    legend: dict[str, str] = {}
     for number, surface in enumerate(scene.surfaces):
         kind, colour, opacity = look(surface)
         if surfaces == "name":

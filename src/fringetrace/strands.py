@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace import legs
 from fringetrace.arms import Mark
-from fringetrace.media import at_wavelength, constants, materials
+from fringetrace.media import at_wavelength
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import CCD, Beam
 from fringetrace.waves import Array, FloatArray, checked_wavelength, path_phase
@@ -157,7 +158,7 @@ def strands(
         share = max(1, most * rays[number] // max(1, sum(rays)))
         rows = _sampled(paths, route, share, every)
         found.append(_strands(paths.where(rows), wavelength, reference, sweep, onward))
-        columns = {"row": rows, "beam": np.full(len(rows), number), "route": route[rows]}
+        columns: dict[str, Any] = {"row": rows, "beam": np.full(len(rows), number), "route": route[rows]}
         found[-1] = replace(found[-1], **columns, routes=routes, rays=sum(rays))
     return _joined(found)
 
@@ -198,51 +199,40 @@ def _sampled(paths: Paths, route: npt.NDArray[np.int64], most: int, every: bool)
     rows, which = rows[order], which[order]
     first = np.flatnonzero(np.diff(which, prepend=-1))
     count = np.diff(first, append=len(which))
-    return rows[first + np.arange(len(first)) % count]
+    return np.asarray(rows[first + np.arange(len(first)) % count], dtype=np.int64)
 
 
 def _strands(
     paths: Paths, wavelength: float | None, reference: Mark | None, sweep: int, onward: float
 ) -> Strands:
     """All of some paths of one beam."""
-    assert paths.points is not None
-    assert paths.surface is not None
     if wavelength is not None:
         paths = at_wavelength(paths, checked_wavelength(wavelength))
+    surface = paths.surface
+    assert surface is not None
     base = paths.wavelength if wavelength is None else wavelength
     wavelengths, chosen = _sweep(paths, base, sweep)
-    through, medium = _media(paths)
-    way = _ways(paths)
-    opl = _opl(paths, way, medium, base)
+    through, medium = legs.media(paths)
+    way = legs.ways(paths)
+    opl = legs.opl(paths, way, medium, base)
     phases = []
     for one in wavelengths:
         there = at_wavelength(paths, float(one))
-        turns = path_phase(_opl(there, way, medium, one), one) + _turned(there, through)
+        turns = path_phase(legs.opl(there, way, medium, one), one) + legs.turned(there, through)
         phases.append(np.mod(turns / (2.0 * np.pi), 1.0))
     phase = np.stack(phases) if phases else np.empty((0, *opl.shape))
-    index = _indices(paths, base)[medium]
+    index = legs.indices(paths, base)[medium]
     points, beyond = _ended(paths, onward)
     opl[beyond] += onward * index[beyond[0], beyond[1] - 1]
     return Strands(
         points=points, opl=np.where(np.isfinite(points[..., 0]), opl, np.nan), phase=phase,
-        steps=_steps(paths, reference), wavelengths=wavelengths, chosen=chosen, surface=paths.surface,
+        steps=_steps(paths, reference), wavelengths=wavelengths, chosen=chosen, surface=surface,
         through=through, index=index, row=np.arange(len(paths)), beam=np.zeros(len(paths), dtype=np.int64),
         ray=paths.ray, fate=paths.fate.astype(np.int64), bounces=paths.bounces.astype(np.int64),
         route=np.zeros(len(paths), dtype=np.int64), power=np.abs(paths.amplitude) ** 2,
         surfaces=tuple(surface.name for surface in paths.scene.surfaces), routes=(), rays=0,
         focused=isinstance(paths.ccd, CCD) and paths.ccd.focus != 0.0,
     )  # fmt: skip
-
-
-def _ways(paths: Paths) -> FloatArray:
-    """Length of each leg, (m, k - 1) metres; negative back from the last hit to the CCD's plane of focus."""
-    assert paths.points is not None
-    legs = np.diff(paths.points, axis=1)
-    way = np.linalg.norm(legs, axis=2)
-    seen = np.flatnonzero(paths.fate == Fate.DETECTED)
-    last = paths.bounces[seen]
-    way[seen, last] = (legs[seen, last] * paths.direction[seen]).sum(axis=1)
-    return np.nan_to_num(way)
 
 
 def _sweep(paths: Paths, base: float | None, count: int) -> tuple[FloatArray, int]:
@@ -263,91 +253,6 @@ def _sweep(paths: Paths, base: float | None, count: int) -> tuple[FloatArray, in
     return np.concatenate(steps), below
 
 
-def _media(paths: Paths) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
-    """Whether light went on through each surface, and the number of the medium on each leg."""
-    assert paths.points is not None
-    assert paths.surface is not None
-    assert paths.triangle is not None
-    scene, (rows, bounces) = paths.scene, paths.surface.shape
-    numbers = {medium: number for number, medium in enumerate(materials(scene))}
-    beside = np.array(
-        [[numbers[s.front or scene.around], numbers[s.back or scene.around]] for s in scene.surfaces]
-    )
-    parts = np.array([surface.boundary for surface in scene.surfaces])
-    through = np.zeros((rows, bounces), dtype=bool)
-    medium = np.full((rows, bounces + 1), numbers[scene.around], dtype=np.int64)
-    legs = np.diff(paths.points, axis=1)
-    for bounce in range(bounces):
-        met = np.flatnonzero(paths.surface[:, bounce] >= 0)
-        surface = paths.surface[met, bounce]
-        last = paths.bounces[met] == bounce + 1
-        onward = np.where(last[:, None], paths.direction[met], legs[met, bounce + 1])
-        normal = _normals(paths, surface, paths.triangle[met, bounce])
-        out = (onward * normal).sum(axis=1)
-        through[met, bounce] = out * (legs[met, bounce] * normal).sum(axis=1) > 0.0
-        medium[:, bounce + 1] = medium[:, bounce]
-        medium[met, bounce + 1] = np.where(
-            parts[surface], beside[surface, (out < 0.0).astype(np.int64)], medium[met, bounce]
-        )
-    return through, medium
-
-
-def _normals(paths: Paths, surface: Array, triangle: Array) -> FloatArray:
-    """Normals of facets, not scaled."""
-    normal = np.empty((len(surface), 3))
-    for number in np.unique(surface):
-        mine = np.flatnonzero(surface == number)
-        mesh = paths.scene.surfaces[number].mesh
-        a, b, c = np.moveaxis(mesh.vertices[mesh.faces[triangle[mine]]], 1, 0)
-        normal[mine] = np.cross(b - a, c - a)
-    return normal
-
-
-def _indices(paths: Paths, wavelength: float | None) -> FloatArray:
-    at = 1.0 if wavelength is None else wavelength
-    return np.array([complex(medium.index(at)).real for medium in materials(paths.scene)])
-
-
-def _last(paths: Paths) -> npt.NDArray[np.int64]:
-    """Number of the point of the last surface whose part is only known at the end; 0: there is none."""
-    assert paths.surface is not None
-    special = np.array([s.boundary or hasattr(s.interface, "act") for s in paths.scene.surfaces])
-    met = (paths.surface >= 0) & special[paths.surface]
-    return np.where(met, np.arange(1, met.shape[1] + 1), 0).max(axis=1, initial=0)
-
-
-def _spread(paths: Paths, sums: FloatArray, total: FloatArray) -> FloatArray:
-    """Sums along paths that end with their totals: what is missing is added from `_last` on."""
-    assert paths.points is not None
-    end = np.isfinite(paths.points[..., 0]).sum(axis=1) - 1
-    rest = total - np.take_along_axis(sums, end[:, None], axis=1)[:, 0]
-    late = np.arange(sums.shape[1]) >= _last(paths)[:, None]
-    return np.asarray(sums + np.where(late, rest[:, None], 0.0), dtype=np.float64)
-
-
-def _opl(paths: Paths, way: FloatArray, medium: Array, wavelength: float | None) -> FloatArray:
-    """Optical path at each point, (m, k) metres."""
-    legs = way * _indices(paths, wavelength)[medium]
-    sums = np.concatenate([np.zeros((len(paths), 1)), np.cumsum(legs, axis=1)], axis=1)
-    return _spread(paths, sums, paths.length)
-
-
-def _turned(paths: Paths, through: Array) -> FloatArray:
-    """By how much surfaces turned the phase up to each point, (m, k) radians; 0 for polarised light."""
-    assert paths.surface is not None
-    assert paths.points is not None
-    turned = np.zeros(paths.points.shape[:2])
-    if paths.field is not None:
-        return turned
-    reflection, transmission = constants(paths.scene)
-    factor = np.where(through, transmission[paths.surface], reflection[paths.surface])
-    turn = np.where((paths.surface >= 0) & (factor != 0.0), np.angle(factor), 0.0)
-    turned[:, 1:-1] = np.cumsum(turn, axis=1)
-    turned[:, -1] = turned[:, -2]
-    ends = np.where(paths.amplitude != 0.0, np.angle(paths.amplitude), turned[:, -1])
-    return _spread(paths, turned, ends)
-
-
 def _steps(paths: Paths, reference: Mark | None) -> npt.NDArray[np.int64]:
     """How often a phase step turns the light at each point."""
     assert paths.points is not None
@@ -360,7 +265,7 @@ def _steps(paths: Paths, reference: Mark | None) -> npt.NDArray[np.int64]:
     steps[:, 1:-1] = met
     steps[:, -1] = met.any(axis=1)
     count: npt.NDArray[np.int64] = reference.sense * reference.count(paths)
-    return steps * count[:, None]
+    return np.asarray(steps * count[:, None], dtype=np.int64)
 
 
 def _ended(paths: Paths, onward: float) -> tuple[FloatArray, tuple[Array, Array]]:
