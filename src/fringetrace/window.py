@@ -129,8 +129,8 @@ class Window:
         mine = np.flatnonzero(np.asarray(data.cell_data["strand"]) == number)
         if len(mine):
             self.plotter.add_mesh(
-                data.extract_cells(mine.tolist()), color="black", line_width=5.0, name="picked", pickable=False,
-                reset_camera=False,
+                data.extract_cells(mine.tolist()), color="black", line_width=5.0, name="picked",
+                pickable=False, reset_camera=False,
             )  # fmt: skip
 
     def clicked(self, picker: Any) -> None:
