@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 import fringetrace as ft
-from fringetrace import cli, commands, sweeps
+from fringetrace import cli, commands, exhibits, meshes, mm, nm, shapes, sweeps
 from fringetrace.studies import Lattice
 
 SHORT = ["--angles", "20 deg", "2", "--wavelengths", "400 nm", "600 nm", "5"]
@@ -102,7 +102,18 @@ def test_a_scene_file_and_a_mesh_are_looked_at(tmp_path, monkeypatch, capsys):
     assert cli.main(["init", "free"]) == 0
     text = capsys.readouterr().out.replace("[128, 128]", "[16, 16]").replace("[64, 64]", "[8, 8]")
     (tmp_path / "my.toml").write_text(text)
-    arguments = ["view", "my.toml", "--html", "it.html", "--export", "it.vtp", "--colour", "phase", "--rays", "4"]
+    arguments = [
+        "view",
+        "my.toml",
+        "--html",
+        "it.html",
+        "--export",
+        "it.vtp",
+        "--colour",
+        "phase",
+        "--rays",
+        "4",
+    ]
     assert cli.main(arguments) == 0
     said = capsys.readouterr()
     assert said.err == ""

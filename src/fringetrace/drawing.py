@@ -350,7 +350,8 @@ def draw(plotter: Plotter, view: View) -> PolyData | None:
     bounds, (nx, ny, nz) = _round_bounds(plotter.bounds)
     plotter.show_grid(
         bounds=bounds, xtitle=f"x / {unit}", ytitle=f"y / {unit}", ztitle=f"z / {unit}",
-        font_size=sized(plotter, 18), color="#808080", n_xlabels=nx, n_ylabels=ny, n_zlabels=nz, fmt="%.4g", use_3d_text=False,
+        font_size=sized(plotter, 18), color="#808080", n_xlabels=nx, n_ylabels=ny,
+        n_zlabels=nz, fmt="%.4g", use_3d_text=False,
     )  # fmt: skip
     plotter.camera_position = "xz"
     plotter.camera.azimuth, plotter.camera.elevation = np.degrees([AZIMUTH, ELEVATION])

@@ -147,7 +147,7 @@ def _tubes(view: View, shown: Strands) -> PolyData:
     import pyvista
 
     path, bounce = shown.legs()
-    ends = np.stack([shown.points[path, bounce], shown.points[path, bounce + 1]], axis=1)
+    ends = np.stack([shown.starts[path, bounce], shown.points[path, bounce + 1]], axis=1)
     cells = np.column_stack([np.full(len(ends), 2), np.arange(2 * len(ends)).reshape(-1, 2)])
     data = pyvista.PolyData(ends.reshape(-1, 3), lines=cells.ravel())
     data["RGB"] = _coloured(view, shown).reshape(-1, 3)
@@ -185,7 +185,7 @@ def _wires(view: View, shown: Strands) -> list[tuple[str, Any]]:
     import trimesh
 
     path, bounce = shown.legs()
-    ends = np.stack([shown.points[path, bounce], shown.points[path, bounce + 1]], axis=1)
+    ends = np.stack([shown.starts[path, bounce], shown.points[path, bounce + 1]], axis=1)
     found = scale(shown, view.colour, view.stage.unit, view.stage.metres)
     colours, which = np.unique(_coloured(view, shown)[:, 1], axis=0, return_inverse=True)
     wires = []

@@ -86,7 +86,7 @@ def _place(point: FloatArray, metres: float) -> str:
 
 
 def _leg(shown: Strands, number: int, leg: int, metres: float) -> str:
-    way = np.linalg.norm(shown.points[number, leg + 1] - shown.points[number, leg]) / metres
+    way = np.linalg.norm(shown.points[number, leg + 1] - shown.starts[number, leg]) / metres
     index = shown.index[number, leg]
     medium = "" if index == 1.0 else f", index {index:.6g}"
     return f"    after {way:.7g}{medium}; optical path so far {shown.opl[number, leg + 1] / metres:.9g}"

@@ -24,7 +24,8 @@ def ways(paths: Paths) -> FloatArray:
         0 where there is no leg.
     """
     assert paths.points is not None
-    legs = np.diff(paths.points, axis=1)
+    assert paths.starts is not None
+    legs = paths.points[:, 1:] - paths.starts
     way = np.linalg.norm(legs, axis=2)
     seen = np.flatnonzero(paths.fate == Fate.DETECTED)
     last = paths.bounces[seen]
@@ -48,6 +49,7 @@ def media(paths: Paths) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
     assert paths.points is not None
     assert paths.surface is not None
     assert paths.triangle is not None
+    assert paths.starts is not None
     scene, (rows, bounces) = paths.scene, paths.surface.shape
     numbers = {medium: number for number, medium in enumerate(materials(scene))}
     beside = np.array(
@@ -56,7 +58,7 @@ def media(paths: Paths) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
     parts = np.array([surface.boundary for surface in scene.surfaces])
     through = np.zeros((rows, bounces), dtype=bool)
     medium = np.full((rows, bounces + 1), numbers[scene.around], dtype=np.int64)
-    legs = np.diff(paths.points, axis=1)
+    legs = paths.points[:, 1:] - paths.starts
     for bounce in range(bounces):
         met = np.flatnonzero(paths.surface[:, bounce] >= 0)
         surface = paths.surface[met, bounce]

@@ -342,7 +342,7 @@ def exploded(shown: Strands, shift: npt.ArrayLike) -> tuple[FloatArray, FloatArr
     """
     path, bounce = shown.legs()
     moved = bounce[:, None] * np.asarray(shift, dtype=np.float64)
-    return shown.points[path, bounce] + moved, shown.points[path, bounce + 1] + moved
+    return shown.starts[path, bounce] + moved, shown.points[path, bounce + 1] + moved
 
 
 def apart(shown: Strands) -> FloatArray:

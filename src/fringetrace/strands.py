@@ -32,6 +32,8 @@ class Strands:
     ----------
     points : (m, k, 3) float64, metres
         The last one is on the chip itself, or a bit on where light left.
+    starts : (m, k - 1, 3) float64, metres
+        Where each leg starts: beside its point, where an element displaced the light.
     opl : (m, k) float64, metres
         Optical path from the start, at the wavelength of the picture; on the chip that to its plane of focus.
     phase : (w, m, k) float64, turns from 0 to 1
@@ -61,6 +63,7 @@ class Strands:
     """
 
     points: FloatArray
+    starts: FloatArray
     opl: FloatArray
     phase: FloatArray
     steps: npt.NDArray[np.int64]
@@ -95,7 +98,7 @@ class Strands:
         return f"{self.shown:,} of {self.rays:,} rays" if self.shown < self.rays else f"{self.rays:,} rays"
 
     def legs(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Path and bounce of every leg: it goes from point [path, bounce] to [path, bounce + 1].
+        """Path and bounce of every leg: it goes from start [path, bounce] to point [path, bounce + 1].
 
         Returns
         -------
@@ -222,10 +225,10 @@ def _strands(
         phases.append(np.mod(turns / (2.0 * np.pi), 1.0))
     phase = np.stack(phases) if phases else np.empty((0, *opl.shape))
     index = legs.indices(paths, base)[medium]
-    points, beyond = _ended(paths, onward)
+    points, starts, beyond = _ended(paths, onward)
     opl[beyond] += onward * index[beyond[0], beyond[1] - 1]
     return Strands(
-        points=points, opl=np.where(np.isfinite(points[..., 0]), opl, np.nan), phase=phase,
+        points=points, starts=starts, opl=np.where(np.isfinite(points[..., 0]), opl, np.nan), phase=phase,
         steps=_steps(paths, reference), wavelengths=wavelengths, chosen=chosen, surface=surface,
         through=through, index=index, row=np.arange(len(paths)), beam=np.zeros(len(paths), dtype=np.int64),
         ray=paths.ray, fate=paths.fate.astype(np.int64), bounces=paths.bounces.astype(np.int64),
@@ -268,7 +271,7 @@ def _steps(paths: Paths, reference: Mark | None) -> npt.NDArray[np.int64]:
     return np.asarray(steps * count[:, None], dtype=np.int64)
 
 
-def _ended(paths: Paths, onward: float) -> tuple[FloatArray, tuple[Array, Array]]:
+def _ended(paths: Paths, onward: float) -> tuple[FloatArray, FloatArray, tuple[Array, Array]]:
     """Points with ends on the chip itself (not in its plane of focus), or a bit on where light left."""
     assert paths.points is not None
     points = paths.points.copy()
@@ -281,8 +284,10 @@ def _ended(paths: Paths, onward: float) -> tuple[FloatArray, tuple[Array, Array]
         points[seen, end[seen]] = last + back[:, None] * direction
     left = np.flatnonzero(paths.fate == Fate.LEFT)
     beyond = left, end[left] + 1
-    points[beyond] = points[left, end[left]] + onward * paths.direction[left]
-    return points, beyond
+    assert paths.starts is not None
+    starts = np.where(np.isfinite(paths.starts), paths.starts, points[:, :-1])
+    points[beyond] = starts[left, end[left]] + onward * paths.direction[left]
+    return points, starts, beyond
 
 
 def _joined(parts: Sequence[Strands]) -> Strands:
