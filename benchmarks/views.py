@@ -1,12 +1,12 @@
-"""The pictures of docs/views.md: python benchmarks/views.py"""
+"""The pictures of docs/views.md: python benchmarks/views.py."""
 
 from __future__ import annotations
 
 import numpy as np
+from pages import DOCS
 
 import fringetrace as ft
 from fringetrace import instruments, mm, nm, shapes, views
-from pages import DOCS
 
 IMAGES = DOCS / "images"
 

@@ -228,7 +228,7 @@ def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
         several = {"n_labels": int(found.high) + 1}
     plotter.add_mesh(
         data, scalars="value", cmap=_listed(found.table()), clim=clim, line_width=1.5, name="rays",
-        show_scalar_bar=not found.names, lighting=view.radius > 0.0, copy_mesh=False,
+        show_scalar_bar=not found.names, lighting=view.radius > 0.0, ambient=0.6, diffuse=0.4, copy_mesh=False,
         scalar_bar_args={**_bar(plotter), **several, "title": title, "position_x": 0.02, "position_y": 0.86},
     )  # fmt: skip
     caption = f"{strands.caption}; colours: {found.title}" if found.names else strands.caption
@@ -355,8 +355,8 @@ def draw(plotter: Plotter, view: View) -> PolyData | None:
     )  # fmt: skip
     plotter.camera_position = "xz"
     plotter.camera.azimuth, plotter.camera.elevation = np.degrees([AZIMUTH, ELEVATION])
-    plotter.reset_camera()
-    plotter.camera.zoom(1.05)
+    plotter.reset_camera(bounds=bounds)
+    plotter.camera.zoom(1.1)
     return data
 
 

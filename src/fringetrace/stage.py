@@ -21,6 +21,7 @@ AZIMUTH, ELEVATION = np.radians([30.0, 25.0])
 BAR = 0.25
 # A letter's width and a line's height, parts of the scene's diagonal in the view.
 LETTER, LINE = 0.017, 0.035
+THICK = np.array([-0.01, -0.01, 0.01, 0.01])  # room around an arrow, likewise
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,6 +287,9 @@ def labels(stage: Stage) -> list[tuple[str, FloatArray, bool]]:
     everything = np.concatenate([plane for _, plane, _ in flat])
     size = float(np.linalg.norm(np.ptp(everything, axis=0)))
     taken = [np.concatenate([plane.min(axis=0), plane.max(axis=0)]) for _, plane, _ in flat]
+    for arrow in stage.arrows:
+        ends = np.stack([arrow.tail, arrow.tip]) @ np.stack([right, up], axis=1)
+        taken.append(np.concatenate([ends.min(axis=0), ends.max(axis=0)]) + size * THICK)
     found = []
     for name, plane, points in flat:
         half, gap = 0.5 * LETTER * size * len(name), 0.012 * size
