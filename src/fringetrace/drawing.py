@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fringetrace.hues import scale, values
-from fringetrace.stage import AZIMUTH, ELEVATION, Panel, Solid, Stage, exploded, labels
+from fringetrace.stage import AZIMUTH, ELEVATION, Panel, Solid, Stage, axes_of_view, exploded, labels
 from fringetrace.strands import Strands
 from fringetrace.waves import FloatArray, nm, unit_of
 
@@ -26,6 +26,8 @@ SOURCE, CHIP, INK = "#E69F00", "#202020", "black"
 LETTERS = 44
 # Pixels, for which sizes of fonts are meant.
 WIDTH = 1600
+# Room for labels of axes, a factor.
+MARGIN = 1.14
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,7 +230,8 @@ def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
         several = {"n_labels": int(found.high) + 1}
     plotter.add_mesh(
         data, scalars="value", cmap=_listed(found.table()), clim=clim, line_width=1.5, name="rays",
-        show_scalar_bar=not found.names, lighting=view.radius > 0.0, ambient=0.6, diffuse=0.4, copy_mesh=False,
+        show_scalar_bar=not found.names, lighting=view.radius > 0.0, ambient=0.6, diffuse=0.4,
+        copy_mesh=False,
         scalar_bar_args={**_bar(plotter), **several, "title": title, "position_x": 0.02, "position_y": 0.86},
     )  # fmt: skip
     caption = f"{strands.caption}; colours: {found.title}" if found.names else strands.caption
@@ -299,6 +302,14 @@ def _round_bounds(bounds: Sequence[float]) -> tuple[list[float], list[int]]:
     return box.ravel().tolist(), [int(n) for n in last - first + 1]
 
 
+def _fitting(bounds: Sequence[float], size: Sequence[int]) -> float:
+    """Half the height of a view that a box fits into, with its labels."""
+    right, up, _ = axes_of_view()
+    corners = np.stack(np.meshgrid(bounds[:2], bounds[2:4], bounds[4:]), axis=-1).reshape(-1, 3)
+    height, width = np.ptp(corners @ up), np.ptp(corners @ right)
+    return float(0.5 * MARGIN * max(height, width * size[1] / size[0]))
+
+
 def clip(plotter: Plotter, normal: FloatArray | None, origin: FloatArray | None) -> None:
     """Hide all that is on the side of a plane that its normal points to.
 
@@ -356,7 +367,7 @@ def draw(plotter: Plotter, view: View) -> PolyData | None:
     plotter.camera_position = "xz"
     plotter.camera.azimuth, plotter.camera.elevation = np.degrees([AZIMUTH, ELEVATION])
     plotter.reset_camera(bounds=bounds)
-    plotter.camera.zoom(1.1)
+    plotter.camera.parallel_scale = _fitting(bounds, plotter.window_size)
     return data
 
 
