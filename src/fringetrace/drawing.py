@@ -23,11 +23,13 @@ BAR = {
 }  # fmt: skip
 SOURCE, CHIP, INK = "#E69F00", "#202020", "black"
 # Letters of a legend's name at most: longer ones would run into the scene.
-LETTERS = 44
+LETTERS = 30
 # Pixels, for which sizes of fonts are meant.
 WIDTH = 1600
 # Room for labels of axes, a factor.
 MARGIN = 1.14
+# How far the scale bar's label is below it, a part of the scene's size.
+BELOW = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,7 +282,8 @@ def _draw_ends(plotter: Plotter, stage: Stage) -> None:
     plotter.add_mesh(
         pyvista.Line(*(stage.bar / metres)), color=INK, line_width=4.0, pickable=False, name="bar"
     )
-    _label(plotter, stage.bar.mean(axis=0) / metres, stage.bar_label, "top", 20)
+    below = stage.bar.mean(axis=0) - BELOW * stage.size * axes_of_view()[1]
+    _label(plotter, below / metres, stage.bar_label, "top", 20)
 
 
 def _label(plotter: Plotter, spot: FloatArray, text: str, vertical: str, size: int) -> None:

@@ -13,6 +13,9 @@ ENDS = {
     Fate.TRUNCATED: "is cut off (too many surfaces)", Fate.FAINT: "is cut off (too faint)",
 }  # fmt: skip
 
+# Coordinates of a point that are smaller beside the others are roundings.
+NOTHING = 1e-12
+
 
 def itinerary(paths: Paths, row: int, wavelength: float | None = None) -> str:
     """One path in words: places, surfaces met, lengths, phase and power.
@@ -82,7 +85,8 @@ def told(shown: Strands, number: int, wavelength: int | None = None, step: float
 
 
 def _place(point: FloatArray, metres: float) -> str:
-    return "(" + ", ".join(f"{x:.5g}" for x in point / metres + 0.0) + ")"
+    shown = np.where(np.abs(point) > NOTHING * np.abs(point).max(), point, 0.0) / metres
+    return "(" + ", ".join(f"{x:.5g}" for x in shown) + ")"
 
 
 def _leg(shown: Strands, number: int, leg: int, metres: float) -> str:

@@ -272,7 +272,7 @@ def _layout(unit: str) -> dict[str, Any]:
         for name in "xyz"
     }
     camera = {
-        "eye": dict(zip("xyz", (1.1 * eye).tolist(), strict=True)), "up": {"x": 0, "y": 0, "z": 1},
+        "eye": dict(zip("xyz", (1.3 * eye).tolist(), strict=True)), "up": {"x": 0, "y": 0, "z": 1},
         "projection": {"type": "orthographic"},
     }  # fmt: skip
     return {
