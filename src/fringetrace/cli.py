@@ -16,9 +16,8 @@ from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
 from fringetrace import commands
-from fringetrace.drawing import unit_of
 from fringetrace.mesh import Mesh
-from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length
+from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length, unit_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,6 +36,7 @@ app.command(commands.brdf)
 app.command(commands.lattice)
 app.command(commands.run)
 app.command(commands.init)
+app.command(commands.view)
 
 FRINGES = 10.0
 # The demo's relief and aperture: slopes that 512 pixels still resolve.

@@ -13,7 +13,9 @@ from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
 
 if TYPE_CHECKING:
     from fringetrace.mesh import Mesh
+    from fringetrace.paths import Paths
     from fringetrace.rods import Lattice
+    from fringetrace.scene import Scene
     from fringetrace.tables import DataArray
 
 # What there is to say, each under a word.
@@ -243,6 +245,92 @@ def init(name: str, /) -> Iterator[tuple[str, str]]:
     from fringetrace import templates
 
     yield "", templates.template(name)
+
+
+def view(
+    scene: Path,
+    /,
+    *,
+    png: Path | None = None,
+    html: Path | None = None,
+    export: Path | None = None,
+    unit: str | None = None,
+    wavelength: str | None = None,
+    colour: str = "route",
+    rays: int = 12,
+    surfaces: str = "interface",
+    allow_outside: bool = False,
+) -> Lines:
+    """Look at a scene file, or at a mesh: in a window, or in files that say what they show.
+
+    Parameters
+    ----------
+    scene
+        TOML file, see `fringetrace init`; or a mesh file, with --unit.
+    png
+        Picture to write.
+    html
+        Page for a browser to write; it needs neither network nor server (pip install 'fringetrace[html]').
+    export
+        Surfaces and rays for other programs: a .glb, .ply or .vtp file to write, in metres.
+    unit
+        Unit of the numbers in a mesh file: nm, um, mm, m, ...
+    wavelength
+        Of phases and of the image on the CCD. Default: the first of the scene file.
+    colour
+        Of rays: route, beam, bounce, length, phase, fate or power.
+    rays
+        Along the longer side of each beam.
+    surfaces
+        Coloured by interface, or by name.
+    allow_outside
+        Let a scene file name meshes and other files that are not in its own folder.
+    """
+    from fringetrace import exhibits
+
+    at = None if wavelength is None else parse_length(wavelength, "--wavelength")
+    seen, paths, looks = _seen(scene, unit, at, rays, allow_outside)
+    looks |= {"colour": colour, "surfaces": surfaces}
+    if not (png or html or export):
+        exhibits.show(seen, paths, **looks)
+        return []
+    if png is not None:
+        exhibits.picture(seen, paths, png, **looks)
+    if html is not None:
+        exhibits.page(seen, paths, html, title=scene.stem, **looks)
+    if export is not None:
+        exhibits.export(seen, paths, export, **looks)
+    count = f"{sum(map(len, paths)):,} path ends of {len(paths)} beams" if paths else "no rays"
+    return [
+        ("scene", f"{len(seen.surfaces)} surfaces, {count}"),
+        ("written", ", ".join(str(path) for path in (png, html, export) if path is not None)),
+    ]
+
+
+def _seen(
+    path: Path, unit: str | None, wavelength: float | None, rays: int, allow_outside: bool
+) -> tuple[Scene, list[Paths], dict[str, Any]]:
+    """What a file has to show: a scene, paths, and how these are drawn."""
+    from fringetrace import meshes, runs, scenes
+    from fringetrace.interfaces import Mirror
+    from fringetrace.scene import Scene, Surface
+
+    if rays < 1:
+        raise ValueError(f"--rays: expected at least 1, got {rays}")
+    if path.suffix.lower() != ".toml":
+        return Scene((Surface(meshes.load(path, unit=unit), Mirror(), path.stem),)), [], {}
+    setup = scenes.load(path, allow_outside=allow_outside)
+    if wavelength is None and setup.wavelengths:
+        wavelength = setup.wavelengths[0]
+    scene, paths, image, reference = runs.seen(setup, wavelength, rays)
+    # as many as were traced are drawn
+    looks = {
+        "wavelength": wavelength,
+        "image": image,
+        "reference": reference,
+        "most": rays**2 * max(1, len(paths)),
+    }
+    return scene, paths, looks
 
 
 def _medium(text: str | None) -> Any:

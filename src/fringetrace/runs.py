@@ -14,18 +14,18 @@ from typing import Any
 import numpy as np
 
 from fringetrace import frames, guards, measurement, records, tables
+from fringetrace.arms import Mark
 from fringetrace.bench import Bench
+from fringetrace.exhibits import few as few
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.media import needs
 from fringetrace.paths import Fate, Ledger, Paths
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.scenes import Setup
 from fringetrace.trace import trace
 from fringetrace.waves import Array, ComplexArray, FloatArray, nm
 from fringetrace.zygo import write_height_map
 
-# Rays of the 3D picture along the longer side.
-DRAWN = 12
 # Outputs that need no CCD.
 BLIND = ("paths.nc", "scene.png")
 
@@ -319,19 +319,36 @@ def _paths_nc(current: Run, folder: Path) -> None:
     tables.write_netcdf(tables.dataset(variables, {}, {}), folder / "paths.nc")
 
 
-def few(shape: tuple[int, int]) -> tuple[int, int]:
-    """A grid of rays of the same proportions, few enough to look at.
+def seen(
+    setup: Setup, wavelength: float | None, rays: int
+) -> tuple[Scene, list[Paths], FloatArray | None, Mark | None]:
+    """A setup to be looked at.
 
     Parameters
     ----------
-    shape : (rows, columns)
+    setup : Setup
+    wavelength : float, metres, optional
+        None: the first that it names, if it names any.
+    rays : int
+        Along the longer side of each beam.
 
     Returns
     -------
-    (rows, columns)
+    scene : Scene
+    paths : list of Paths
+        Of each beam, recorded.
+    image : (rows, columns) float64, or None
+        What the CCD shows, if there is one, and a wavelength.
+    reference : Mark or None
+        What a phase step turns, of a bench.
     """
-    rows, columns = (max(1, round(DRAWN * n / max(shape))) for n in shape)
-    return rows, columns
+    current = Run(setup)
+    bench, ccd = current.bench, setup.ccd if current.bench is None else current.ccd
+    beams = [replace(beam, shape=few(beam.shape, rays)) for beam in current.beams]
+    paths = [current.traced(beam, ccd, wavelength, record=True) for beam in beams]
+    image = None if ccd is None or wavelength is None or not beams else current.image(wavelength)
+    reference = None if bench is None else bench.mark or Mark(bench.reference)
+    return setup.scene, paths, image, reference
 
 
 def _scene_png(current: Run, folder: Path) -> str | None:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fringetrace.curves import comparison, spectra, work_precision
-from fringetrace.drawing import opengl, picture, show, unit_of
+from fringetrace.exhibits import export, page, picture, show
+from fringetrace.itinerary import itinerary
 from fringetrace.lobes import brdf, mirror_spectra, overview, polar, spectrogram
+from fringetrace.offscreen import opengl
 from fringetrace.tables import whole
-from fringetrace.waves import Array, FloatArray, checked_wavelength
+from fringetrace.waves import Array, FloatArray, checked_wavelength, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
@@ -20,11 +22,14 @@ if TYPE_CHECKING:
 __all__ = [
     "brdf",
     "comparison",
+    "export",
     "height",
     "interferogram",
+    "itinerary",
     "mirror_spectra",
     "opengl",
     "overview",
+    "page",
     "phase",
     "picture",
     "polar",
