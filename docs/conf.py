@@ -54,6 +54,7 @@ sphinx_gallery_conf = {
     "within_subsection_order": "FileNameSortKey",
     "image_scrapers": ("sources.leavings",),
     "reset_modules": (),
+    "capture_repr": (),
     "download_all_examples": False,
     "write_computation_times": False,
     "plot_gallery": not FAST,
@@ -65,5 +66,6 @@ def setup(app: Sphinx) -> None:
     import sources
 
     app.connect("builder-inited", sources.write_reference, priority=100)
+    app.connect("builder-inited", sources.copy_notebooks, priority=100)
     app.connect("autodoc-process-docstring", sources.escape, priority=100)
     app.connect("missing-reference", sources.link)

@@ -13,7 +13,8 @@ import fringetrace
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
-REFERENCE = Path(__file__).parent / "reference"
+DOCS = Path(__file__).parent
+EXAMPLES = DOCS.parent / "examples"
 # Rooms that one imports by name, beside those that `import fringetrace` offers.
 FURTHER = ("detectors", "guards", "illumination", "lines", "precision", "rods", "single", "standards", "waves")
 
@@ -33,18 +34,30 @@ def overview(rooms: list[str]) -> str:
     return "\n".join(["# Reference", "", "| | |", "|---|---|", *rows, "", *toctree, ""])
 
 
-def write_reference(app: Sphinx) -> None:
-    """Write the pages of the reference, those that changed; what is no longer public goes."""
-    rooms = sorted([*fringetrace._ROOMS, *FURTHER])
-    pages = {f"{room}.rst": page(f"fringetrace.{room}") for room in rooms}
-    pages |= {"fringetrace.rst": page("fringetrace"), "index.md": overview(rooms)}
-    REFERENCE.mkdir(exist_ok=True)
-    for old in {path.name for path in REFERENCE.iterdir()} - set(pages):
-        (REFERENCE / old).unlink()
-    for name, text in pages.items():
-        file = REFERENCE / name
+def renew(folder: Path, texts: dict[str, str]) -> None:
+    """Let a folder hold these files and no others; those that are the same are not touched."""
+    folder.mkdir(exist_ok=True)
+    for old in {path.name for path in folder.iterdir()} - set(texts):
+        (folder / old).unlink()
+    for name, text in texts.items():
+        file = folder / name
         if not file.exists() or file.read_text(encoding="utf-8") != text:
             file.write_text(text, encoding="utf-8")
+
+
+def write_reference(app: Sphinx) -> None:
+    """Write the pages of the reference."""
+    rooms = sorted([*fringetrace._ROOMS, *FURTHER])
+    pages = {f"{room}.rst": page(f"fringetrace.{room}") for room in rooms}
+    renew(DOCS / "reference", pages | {"fringetrace.rst": page("fringetrace"), "index.md": overview(rooms)})
+
+
+def copy_notebooks(app: Sphinx) -> None:
+    """Bring the notebooks of examples/ to where Sphinx finds them, with a page that lists them."""
+    texts = {path.name: path.read_text(encoding="utf-8") for path in EXAMPLES.glob("*.ipynb")}
+    listed = ["```{toctree}", *sorted(name.removesuffix(".ipynb") for name in texts), "```"]
+    index = ["# Notebooks", "", "From `examples/`, run when this site is built.", "", *listed, ""]
+    renew(DOCS / "notebooks", texts | {"index.md": "\n".join(index)})
 
 
 def escape(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
