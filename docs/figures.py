@@ -90,7 +90,9 @@ def folded(axes: Any) -> None:
         lines[0][0].set_label(label)
     around = np.linspace(0, 2 * np.pi, 361)
     caustic = RADIUS * np.sin(TILT) ** 3 / um
-    axes.plot(caustic * np.cos(around), caustic * np.sin(around), color="black", linewidth=1.5, label="caustic")
+    axes.plot(
+        caustic * np.cos(around), caustic * np.sin(around), color="black", linewidth=1.5, label="caustic"
+    )
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), frameon=False, ncols=3, **TIGHT)
     axes.set(xlim=(-60, 60), ylim=(-60, 60), aspect="equal", xlabel="x / µm", ylabel="y / µm")
     axes.set_title("the same sheet on the camera")

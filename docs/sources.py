@@ -16,7 +16,10 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
 # Rooms that one imports by name, beside those that `import fringetrace` offers.
-FURTHER = ("detectors", "guards", "illumination", "lines", "precision", "rods", "single", "standards", "waves")
+FURTHER = (
+    "detectors", "guards", "illumination", "lines", "precision", "rig", "rods", "single", "standards",
+    "waves",
+)  # fmt: skip
 
 
 def page(name: str) -> str:
@@ -26,7 +29,9 @@ def page(name: str) -> str:
 
 def overview(rooms: list[str]) -> str:
     """The first page of the reference: each room with the first sentence of its docstring."""
-    rows = ["| [`fringetrace`](fringetrace.rst) | What comes with `import fringetrace as ft`: `ft.` and a name. |"]
+    rows = [
+        "| [`fringetrace`](fringetrace.rst) | What comes with `import fringetrace as ft`: `ft.` and a name. |"
+    ]
     for room in rooms:
         text = (import_module(f"fringetrace.{room}").__doc__ or "").split("\n\n")[0]
         rows.append(f"| [`{room}`]({room}.rst) | {' '.join(text.split())} |")
