@@ -115,7 +115,8 @@ class Meter:
 
         def checked(actual: Any, desired: Any, rtol: float = 1e-7, atol: float = 0.0, **options: Any) -> None:
             close(actual, desired, rtol, atol, **options)
-            off, size, margin = np.broadcast_arrays(abs(np.asarray(actual) - desired), abs(desired), atol)
+            size = abs(np.asarray(desired))
+            off, size, margin = np.broadcast_arrays(abs(np.asarray(actual) - desired), size, atol)
             allowed = margin + rtol * size
             for worst in np.argwhere(off == np.nanmax(off, initial=0.0))[:1]:
                 at, relative = tuple(worst), not margin.any()

@@ -67,5 +67,6 @@ def setup(app: Sphinx) -> None:
 
     app.connect("builder-inited", sources.write_reference, priority=100)
     app.connect("builder-inited", sources.copy_notebooks, priority=100)
+    app.connect("builder-inited", sources.tidy_gallery, priority=100)
     app.connect("autodoc-process-docstring", sources.escape, priority=100)
     app.connect("missing-reference", sources.link)

@@ -57,6 +57,13 @@ def write_reference(app: Sphinx) -> None:
     renew(DOCS / "reference", pages | {"fringetrace.rst": page("fringetrace"), "index.md": overview(rooms)})
 
 
+def tidy_gallery(app: Sphinx) -> None:
+    """Take away the pages of examples that are gone."""
+    for page in (DOCS / "gallery").glob("[0-9]*"):
+        if not (EXAMPLES / f"{page.name.split('.')[0]}.py").exists():
+            page.unlink()
+
+
 def copy_notebooks(app: Sphinx) -> None:
     """Bring the notebooks of examples/ to where Sphinx finds them, with a page that lists them."""
     texts = {path.name: path.read_text(encoding="utf-8") for path in EXAMPLES.glob("*.ipynb")}
