@@ -26,6 +26,7 @@ from types import FrameType
 from typing import Any
 from unittest import mock
 
+import mpmath
 import numpy as np
 import pages
 import pytest
@@ -35,6 +36,8 @@ TESTS = Path(__file__).parents[1] / "tests" / "physics"
 SYSTEMS = Path(__file__).with_suffix(".csv")
 # pytest compares arrays and sequences number by number, with this.
 Scalar = type(pytest.approx(1.0))
+# How pytest writes numbers.
+NUMBERS = {"np": np, "mpf": mpmath.mpf}
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class Meter:
 
     def keep(self, error: float, allowed: float, relative: bool, where: str) -> None:
         """Keep what held."""
-        if self.test and 0.0 <= error <= allowed < math.inf:
+        if self.test and where and 0.0 <= error <= allowed < math.inf:
             self.readings[self.test].append(Reading(float(error), float(allowed), bool(relative), where))
 
     @pytest.hookimpl(wrapper=True)
@@ -95,10 +98,13 @@ class Meter:
         sides = re.fullmatch(r"(.+?) <=? (.+)", expl.partition("\n")[0])
         if sides:
             try:
-                error, allowed = (float(eval(side, {"np": np})) for side in sides.groups())
+                error, allowed = (float(eval(side, NUMBERS)) for side in sides.groups())
             except (SyntaxError, NameError, TypeError, ValueError, AttributeError):
                 return
-            self.keep(error, allowed, False, statement(str(item.path), lineno))
+            # a library's own assertions are heard too, with line numbers of another file
+            text = f"assert {ast.unparse(ast.parse(f'({orig})', mode='eval'))}"
+            where = statement(str(item.path), lineno)
+            self.keep(error, allowed, False, where if where.startswith(text) else "")
 
     @contextmanager
     def listening(self) -> Iterator[None]:
