@@ -102,7 +102,7 @@ class Meter:
             except (SyntaxError, NameError, TypeError, ValueError, AttributeError):
                 return
             # a library's own assertions are heard too, with line numbers of another file
-            text = f"assert {ast.unparse(ast.parse(f'({orig})', mode='eval'))}"
+            text = "assert " + ast.unparse(ast.parse(f"({orig}\n)", mode="eval"))
             where = statement(str(item.path), lineno)
             self.keep(error, allowed, False, where if where.startswith(text) else "")
 
