@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.detectors import Detector, Pixels, everything
 from fringetrace.illumination import Setup
-from fringetrace.media import materials, needs
+from fringetrace.media import needs
 from fringetrace.nufft import TOLERANCE, checked_wavelengths, spectrum
 from fringetrace.paths import Fate, Paths
 from fringetrace.scene import Scene
 from fringetrace.trace import stream
 from fringetrace.waves import ComplexArray, FloatArray
-
-if TYPE_CHECKING:
-    from fringetrace.indices import Material
 
 FATES = ("reflected", "transmitted", "missed", "absorbed", "truncated")
 # Rays whose sums are taken at once: 100 MB of paths.
@@ -60,19 +55,9 @@ def _shares(paths: Paths) -> FloatArray:
     return np.array([*sums, ledger.absorbed, ledger.truncated])
 
 
-def _faded(paths: Paths, wavelength: float, absorbing: Mapping[Material, Material]) -> Paths:
-    """Paths through clear media, as the absorption of those that they stand for leaves them."""
-    assert paths.lengths is not None
-    media = [absorbing.get(medium, medium) for medium in materials(paths.scene)]
-    kappa = np.array([complex(medium.index(wavelength)).imag for medium in media])
-    return replace(
-        paths, amplitude=paths.amplitude * np.exp(-2.0 * np.pi / wavelength * (paths.lengths @ kappa))
-    )
-
-
-def _bands(scene: Scene, waves: FloatArray, absorbing: bool) -> list[tuple[float | None, slice]]:
+def _bands(scene: Scene, waves: FloatArray) -> list[tuple[float | None, slice]]:
     """Wavelengths that one trace serves: all of them, or each its own where rays or amplitudes hang on it."""
-    if needs(scene) is None and not absorbing:
+    if needs(scene) is None:
         return [(None, slice(None))]
     return [(float(wave), slice(i, i + 1)) for i, wave in enumerate(waves)]
 
@@ -125,7 +110,6 @@ def far_field(
     chosen: npt.NDArray[np.bool_] | None = None,
     max_bounces: int = 100,
     min_amplitude: float = 1e-6,
-    absorbing: Mapping[Material, Material] | None = None,
     max_reflections: int | None = None,
     half_wave_loss: bool = True,
     tolerance: float = TOLERANCE,
@@ -144,10 +128,6 @@ def far_field(
         See `brdf`.
     chosen : (theta, phi) bool, optional
         The directions whose amplitudes are wanted; the others stay 0. Default: all.
-    absorbing : mapping of Material to Material, optional
-        Media of the scene that stand, clear, for others: light is bent and split by their index, and
-        absorbed along its way as those others do. For small parts of weak absorption, inside which rays
-        are reflected many times: waves that fade across their direction are no rays.
 
     Returns
     -------
@@ -158,7 +138,7 @@ def far_field(
     total = np.zeros((*size, len(waves)), dtype=np.complex128)
     power, count = np.zeros((*size, len(waves))), np.zeros(size, dtype=np.int64)
     shares, incident = np.zeros(len(FATES)), 0.0
-    bands = _bands(setup.scene, waves, bool(absorbing))
+    bands = _bands(setup.scene, waves)
     source = setup.light(theta, phi)
     adding = _Adding(setup, detector, method, wanted & (method != "power"), half_wave_loss, tolerance)
     for wavelength, band in bands:
@@ -167,13 +147,7 @@ def far_field(
             setup.scene, source, wavelength=wavelength, max_bounces=max_bounces, min_amplitude=min_amplitude,
             threads=threads, chunk=CHUNK,
         ):  # fmt: skip
-            share, incident = _shares(paths), incident + paths.ledger().incident
-            if absorbing:
-                assert wavelength is not None
-                paths = _faded(paths, wavelength, absorbing)
-                left = _shares(paths)[:3]
-                share = np.array([*left, share[3] + (share[:3] - left).sum(), share[4]])
-            shares += share
+            shares, incident = shares + _shares(paths), incident + paths.ledger().incident
             most = paths if max_reflections is None else paths.where(paths.reflections <= max_reflections)
             sums, powers, counts = adding.chunk(most, start, waves[band])
             total[..., band] += sums

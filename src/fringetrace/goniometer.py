@@ -182,7 +182,6 @@ def brdf(
     options
         max_bounces : int, surfaces that a path may meet, default 100;
         min_amplitude : float, branches below this part of the launched amplitude are cut off, default 1e-6;
-        absorbing : mapping, clear media that stand for absorbing ones, see `farfield.far_field`;
         max_reflections : int, paths with more are left out of the sums, default none;
         half_wave_loss : bool, count the -1 of each reflection, default True;
         tolerance : float, of the sums, see `nufft.spectrum`, default 1e-12;
