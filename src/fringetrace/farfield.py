@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.detectors import Detector, Pixels, everything
+from fringetrace.detectors import Detector, Pixels, everything, sides, towards
 from fringetrace.illumination import Setup
 from fringetrace.media import needs
 from fringetrace.nufft import TOLERANCE, checked_wavelengths, spectrum
 from fringetrace.paths import Fate, Paths
-from fringetrace.scene import Scene
+from fringetrace.rays import Rays
+from fringetrace.scene import Beam, Scene
 from fringetrace.trace import stream
 from fringetrace.waves import ComplexArray, FloatArray
 
@@ -27,8 +29,9 @@ class Far:
 
     Attributes
     ----------
-    amplitude : (theta, phi, wavelength) complex128, m^2 (rays, where they have no area)
-        Sum of area * amplitude * exp(i k length) over the rays that arrive.
+    amplitude : (theta, phi, parts, wavelength) complex128, m^2 (rays, where they have no area)
+        Sum of area * amplitude * exp(i k length) over the rays that arrive; of one number a ray, or
+        of s and p light, see `detectors.sides`. Powers of several parts add.
     power : (theta, phi, wavelength) float64, m^2 (rays)
         Sum of area * |amplitude|^2 over them.
     rays : (theta, phi) int64
@@ -76,13 +79,9 @@ class _Adding:
     def chunk(
         self, paths: Paths, start: float, waves: FloatArray
     ) -> tuple[ComplexArray, FloatArray, npt.NDArray[np.int64]]:
-        """Amplitudes (theta, phi, wavelength), powers and numbers (theta, phi) of some paths."""
-        if paths.field is not None:
-            raise ValueError(
-                "goniometer: expected light without polarisation, got a field of three components"
-            )
+        """Amplitudes (theta, phi, parts, wavelength), powers and numbers (theta, phi) of some paths."""
         size, centre = self.wanted.shape, np.asarray(self.setup.centre)
-        total = np.zeros((self.wanted.size, len(waves)), dtype=np.complex128)
+        total = np.zeros((self.wanted.size, parts(paths.source), len(waves)), dtype=np.complex128)
         power, count = np.zeros(self.wanted.size), np.zeros(self.wanted.size, dtype=np.int64)
         unit = 1.0 if paths.area is None else paths.area
         arrivals = self.detector.arrivals(paths, centre)
@@ -90,13 +89,53 @@ class _Adding:
             arrivals = everything(paths, self.detector, centre)
         since = 0.0 if isinstance(self.detector, Pixels) else start
         for i, (rows, length) in enumerate(arrivals):
-            amplitude = paths.amplitude[rows]
-            count[i], power[i] = len(rows), unit * (np.abs(amplitude) ** 2).sum()
+            count[i], power[i] = len(rows), unit * (np.abs(paths.amplitude[rows]) ** 2).sum()
             if self.wanted.flat[i] and len(rows):
-                if not self.half_wave_loss:
-                    amplitude = np.where(paths.reflections[rows] % 2 == 1, -amplitude, amplitude)
+                amplitude = self._seen(paths, rows, i)
                 total[i] = unit * spectrum(length - since, amplitude, waves, self.tolerance)
-        return total.reshape(*size, -1), power.reshape(size), count.reshape(size)
+        return total.reshape(*size, *total.shape[1:]), power.reshape(size), count.reshape(size)
+
+    def _seen(self, paths: Paths, rows: npt.NDArray[np.int64], place: int) -> ComplexArray:
+        """(parts, n) amplitudes of some paths, as seen from one of the detector's directions."""
+        amplitude = paths.amplitude[None, rows]
+        if paths.field is not None:
+            theta, phi = (
+                float(angles.flat[place])
+                for angles in np.meshgrid(self.detector.theta, self.detector.phi, indexing="ij")
+            )
+            amplitude = sides(towards(theta, phi), phi) @ paths.field[rows].T
+        if not self.half_wave_loss:
+            amplitude = np.where(paths.reflections[rows] % 2 == 1, -amplitude, amplitude)
+        return amplitude
+
+
+def parts(source: Beam | Rays) -> int:
+    """How many amplitudes light has: one, or those of s and p."""
+    return 1 if source.polarisation is None else 2
+
+
+def mean(fars: Sequence[Far]) -> Far:
+    """Light of several states that do not interfere: the mean of what left.
+
+    Parameters
+    ----------
+    fars : sequence of Far
+        Lit from the same direction by the same power.
+
+    Returns
+    -------
+    Far
+        Parts of the amplitude of all, so scaled that their powers add up to the mean.
+    """
+    if len(fars) == 1:
+        return fars[0]
+    return Far(
+        np.concatenate([far.amplitude for far in fars], axis=2) / np.sqrt(len(fars)),
+        np.mean([far.power for far in fars], axis=0),
+        np.sum([far.rays for far in fars], axis=0),
+        {name: float(np.mean([far.shares[name] for far in fars])) for name in FATES},
+        fars[0].incident,
+    )
 
 
 def far_field(
@@ -107,6 +146,7 @@ def far_field(
     wavelengths: npt.ArrayLike,
     *,
     method: str = "rays",
+    jones: npt.ArrayLike | None = None,
     chosen: npt.NDArray[np.bool_] | None = None,
     max_bounces: int = 100,
     min_amplitude: float = 1e-6,
@@ -126,6 +166,8 @@ def far_field(
     wavelengths : (w,) float64, metres
     method, max_bounces, min_amplitude, max_reflections, half_wave_loss, tolerance, threads
         See `brdf`.
+    jones : (2,) complex, optional
+        Amplitudes of s and p of the light, see `Setup.light`.
     chosen : (theta, phi) bool, optional
         The directions whose amplitudes are wanted; the others stay 0. Default: all.
 
@@ -135,11 +177,11 @@ def far_field(
     """
     waves, size = checked_wavelengths(wavelengths), (len(detector.theta), len(detector.phi))
     wanted = np.ones(size, dtype=bool) if chosen is None else chosen
-    total = np.zeros((*size, len(waves)), dtype=np.complex128)
+    source = setup.light(theta, phi, jones)
+    total = np.zeros((*size, parts(source), len(waves)), dtype=np.complex128)
     power, count = np.zeros((*size, len(waves))), np.zeros(size, dtype=np.int64)
     shares, incident = np.zeros(len(FATES)), 0.0
     bands = _bands(setup.scene, waves)
-    source = setup.light(theta, phi)
     adding = _Adding(setup, detector, method, wanted & (method != "power"), half_wave_loss, tolerance)
     for wavelength, band in bands:
         start = setup.start(source, wavelength)
@@ -153,5 +195,5 @@ def far_field(
             total[..., band] += sums
             power[..., band] += powers[..., None]
             count += counts
-    parts = dict(zip(FATES, (shares / incident).tolist(), strict=True))
-    return Far(total, power, count, parts, incident / len(bands))
+    fates = dict(zip(FATES, (shares / incident).tolist(), strict=True))
+    return Far(total, power, count, fates, incident / len(bands))
