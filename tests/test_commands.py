@@ -26,9 +26,8 @@ def test_a_mesh_to_its_brdf(rods, tmp_path, capsys, extra):
     said = capsys.readouterr().out
     assert "rods.ply: 408 triangles" in said
     assert "reflected" in said
-    # 65 nm at 600 nm: of prisms of 18 sides, 0.985 of it upwards
-    assert "size parameter 0.67" in said
-    assert "estimated from the mesh's parts" in said
+    assert "size parameter 0.681, phase across inf rad: no ray method" in said  # 2 pi 65 / 600
+    assert "of the mesh's smallest part" in said
     assert {file.name for file in out.iterdir()} == set(commands.FILES)
     with xarray.open_dataarray(out / "brdf.nc", engine="h5netcdf") as table:
         assert table.shape[0] == 2

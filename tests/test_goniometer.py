@@ -28,7 +28,7 @@ def test_axes_and_power(rods):
     table = brdf(rods, (THETA, [0.0, 0.5]), Cones(THETA, 1 * degree, [0.0]), WAVES, rays=(2, 500))
     assert table.dims == goniometer.AXES
     assert table.shape == (3, 2, 3, 1, 3)
-    assert table.attrs["units"] == "sr-1"
+    assert table.attrs["units"] == "1/sr"
     assert np.array_equal(table.wavelength, WAVES)
     assert sum(table[name] for name in POWERS).values == pytest.approx(1.0, abs=1e-12)
     assert (table.absorbed > 0.0).all()

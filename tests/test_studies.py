@@ -184,7 +184,7 @@ def ray_error(size, polarisation="E"):
 
 
 def test_rays_come_near_as_rods_grow():
-    # measured 0.42, 0.14, 0.13 at 2, 8, 32 (H: 0.16 at 32); what is left are the ends of the sum at the rods' edges
+    # measured 0.42, 0.14, 0.13 at 2, 8, 32, H 0.16 at 32; what is left are the ends at the rods' edges
     small, large = ray_error(2), ray_error(32)
     assert max(large, ray_error(32, "H")) < 0.2
     assert small > 2 * large

@@ -12,7 +12,6 @@ import numpy as np
 from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
 
 if TYPE_CHECKING:
-    from fringetrace.mesh import Mesh
     from fringetrace.rods import Lattice
     from fringetrace.tables import DataArray
 
@@ -22,8 +21,6 @@ Lines = list[tuple[str, str]]
 WAVELENGTHS = ("300 nm", "700 nm", "401")
 FILES = ("brdf.nc", "brdf.csv", "spectra.png")
 LAYERS = "reflectance.csv"
-# Part of the largest extent up to which a part counts as flat.
-FLAT = 1e-6
 
 
 def brdf(
@@ -70,8 +67,8 @@ def brdf(
     hemisphere
         Observe the whole upper hemisphere instead: so many rings, four times as many sectors.
     feature
-        Radius of the roundest small parts, to say what rays are worth. Default: half of the least extent
-        of any connected part of the mesh.
+        Radius of the roundest small parts, to say what rays are worth. Default: half the breadth of the
+        smallest connected part of the mesh.
     threads
         Default: one for each core.
     """
@@ -82,7 +79,7 @@ def brdf(
     from fringetrace.validity import validity
 
     sample = meshes.load(mesh, unit=unit)
-    radius = _extent(sample) / 2.0 if feature is None else parse_length(feature, "--feature")
+    radius = None if feature is None else parse_length(feature, "--feature")
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     detector: goniometer.Cells | goniometer.Cones = goniometer.Cones(
         theta, parse_angle(acceptance, "--acceptance")
@@ -96,14 +93,14 @@ def brdf(
             scene, theta, detector, _steps(wavelengths, "--wavelengths", parse_length), method=method,
             rays=rays, threads=threads,
         )  # fmt: skip
-        worth = validity(radius, float(table.wavelength.max()), CONDUCTOR)
-        table.attrs |= worth.attributes
+        if radius is not None:
+            table.attrs |= validity(radius, float(table.wavelength.max()), CONDUCTOR).attributes
         _write(table, part)
-    guess = "" if feature else f" (radius {radius:.3g} m estimated from the mesh's parts; --feature says it)"
+    guess = "" if feature else " (of the mesh's smallest part; --feature says it)"
     return [
         ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
         *_powers(table),
-        ("rays", f"{worth}{guess}"),
+        ("rays", f"{table.attrs['validity']}{guess}"),
         ("written", f"{folder}: {', '.join(FILES)}"),
     ]
 
@@ -264,21 +261,6 @@ def _endless(base: Lattice, axes: dict[str, Any], theta: FloatArray, waves: Floa
         ("rays", str(both[0].attrs["validity"])),
         ("written", f"{out}: {LAYERS}"),
     ]
-
-
-def _extent(mesh: Mesh) -> float:
-    """Least extent along x, y or z of any connected part of a mesh that is not flat there, metres."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(mesh.vertices)
-    ends = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
-    part = connected_components(coo_matrix((np.ones(len(ends[0])), ends), (count, count)), directed=False)[1]
-    order = np.argsort(part, kind="stable")
-    first = np.flatnonzero(np.diff(part[order], prepend=-1))
-    reach = (f.reduceat(mesh.vertices[order], first) for f in (np.maximum, np.minimum))
-    extent = np.subtract(*reach)
-    return float(extent[extent > FLAT * extent.max()].min())
 
 
 def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fringetrace.detectors import Cells, Cones, Detector, Pixels, checked_angles
 from fringetrace.farfield import FATES, Far, far_field, mean
 from fringetrace.guards import FringetraceWarning
-from fringetrace.illumination import Polarisation, Setup, Source, footprint, states
+from fringetrace.illumination import Polarisation, Setup, Source, footprint, states, worth
 from fringetrace.nufft import checked_wavelengths
 from fringetrace.scene import Scene
 from fringetrace.tables import array
@@ -217,7 +217,9 @@ def brdf(
         power that were reflected (upwards), transmitted (downwards), missed, absorbed, truncated: they
         add up to 1. `collected` (incidence, wavelength) is what the table itself holds, the BRDF
         summed over its projected solid angles: with "power" and `Cells` it is `reflected`; with
-        `Cones` or `Pixels` it is what falls into them. `ray_count` says how many there were.
+        `Cones` or `Pixels` it is what falls into them. `ray_count` says how many there were. What rays
+        are worth on the smallest part, at the longest wavelength, is among the attributes: size
+        parameter, phase across, error, and in words `validity`.
 
     Raises
     ------
@@ -258,7 +260,8 @@ def brdf(
         square = values.reshape(len(pairs), len(pairs), -1)
         later = np.tri(len(pairs), k=-1, dtype=bool)
         square[later] = square.transpose(1, 0, 2)[later]
-    return _table(values, fars, theta, phi, detector, waves, method)
+    table = _table(values, fars, theta, phi, detector, waves, method)
+    return table.assign_attrs(worth(scene, float(waves.max())).attributes)
 
 
 def _table(
@@ -278,7 +281,7 @@ def _table(
         share = np.reshape([far.shares[name] for far in fars], grid)
         coordinates[name] = (AXES[:2], share, {"units": "1", "long_name": f"power {name} / incident"})
     attributes = {
-        "units": "sr-1", "long_name": "BRDF", "method": method, "detector": type(detector).__name__,
+        "units": "1/sr", "long_name": "BRDF", "method": method, "detector": type(detector).__name__,
         "power_unaccounted": max(abs(sum(far.shares.values()) - 1.0) for far in fars),
     }  # fmt: skip
     return array(values.reshape(*grid, *values.shape[1:]), AXES, coordinates, "brdf", attributes)

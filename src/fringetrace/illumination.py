@@ -9,8 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.detectors import sides, towards
+from fringetrace.harmonics import CONDUCTOR, Index
+from fringetrace.mesh import Mesh
 from fringetrace.rays import Rays, launch
 from fringetrace.scene import Beam, Scene
+from fringetrace.validity import Validity, validity
 from fringetrace.waves import ComplexArray, FloatArray, checked_length
 
 Source = Callable[[float, float], Beam | Rays]
@@ -57,6 +60,49 @@ def states(polarisation: Polarisation, shape: tuple[int, int]) -> list[tuple[Com
     if not (np.isfinite(given).all() and given.any(axis=-1).all()):
         raise ValueError("goniometer polarisation: expected finite amplitudes, not both 0, got others")
     return [(one,) for one in np.broadcast_to(given, (*shape, 2)).reshape(-1, 2)]
+
+
+def worth(scene: Scene, wavelength: float) -> Validity:
+    """What rays are worth on the smallest part of a scene, taken for a rod, see `fringetrace.validity`.
+
+    Parameters
+    ----------
+    scene : Scene
+    wavelength : float, metres
+        In vacuum.
+
+    Returns
+    -------
+    Validity
+        Of half the `breadth` of a mesh, out of its own matter or a conductor.
+    """
+    around = scene.around
+    found = []
+    for surface in scene.surfaces:
+        index: Index = CONDUCTOR
+        host: Index = around.index
+        if surface.boundary:
+            index, host = ((medium or around).index for medium in (surface.back, surface.front))
+        found.append(validity(0.5 * breadth(surface.mesh), wavelength, index, host))
+    return min(found, key=lambda one: one.size_parameter)
+
+
+def breadth(mesh: Mesh) -> float:
+    """The second largest of the extents along x, y, z of a mesh's connected parts, of the smallest, metres.
+
+    Of rods their diameter; of plates and reliefs, however shallow, a side.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.vertices)
+    ends = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
+    part = connected_components(coo_matrix((np.ones(len(ends[0])), ends), (count, count)), directed=False)[1]
+    order = np.argsort(part, kind="stable")
+    first = np.flatnonzero(np.diff(part[order], prepend=-1))
+    reach = (f.reduceat(mesh.vertices[order], first) for f in (np.maximum, np.minimum))
+    second = np.sort(np.subtract(*reach), axis=1)[:, 1]
+    return float(second[second > 0.0].min())
 
 
 def footprint(

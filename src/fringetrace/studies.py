@@ -296,5 +296,5 @@ def _table(
         share = np.stack([one[name] for one in done])
         coordinates[name] = ((*axes, *AXES[:2]), share.reshape(*shape, *share.shape[1:]), {"units": "1"})
     values = np.stack([one["brdf"] for one in done])
-    unit = {"units": "sr-1", "long_name": "BRDF", **attributes}
+    unit = {"units": "1/sr", "long_name": "BRDF", **attributes}
     return array(values.reshape(*shape, *values.shape[1:]), (*axes, *AXES), coordinates, "brdf", unit)
