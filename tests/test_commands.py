@@ -3,6 +3,7 @@
 import csv
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import pytest
 import xarray
 
@@ -10,6 +11,7 @@ import fringetrace as ft
 from fringetrace import cli, commands, sweeps
 from fringetrace.studies import Lattice
 
+WAVES = [400e-9, 700e-9]
 SHORT = ["--angles", "20 deg", "2", "--wavelengths", "400 nm", "600 nm", "5"]
 
 
@@ -37,6 +39,34 @@ def test_a_mesh_to_its_brdf(rods, tmp_path, capsys, extra):
     assert (out / "spectra.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.fixture
+def feathers(tmp_path):
+    """In the form of pavo (R)."""
+    rows = [f"{wl},{5 + (wl - 300) / 20:.2f},12.5" for wl in range(300, 701, 10)]
+    (tmp_path / "feathers.csv").write_text("\n".join(['"wl","eye","stem"', *rows]))
+    return str(tmp_path / "feathers.csv")
+
+
+def test_a_mesh_of_matter_in_polarised_light_beside_measured_spectra(rods, feathers, tmp_path, capsys):
+    given = ["brdf", str(rods), "--unit", "um", *SHORT, "--rays", "1", "60", "--measured", feathers]
+    given += ["--material", "1.7", "--around", "1.5"]
+    tables = {}
+    for polarisation in ("s", "p"):
+        out = tmp_path / polarisation
+        assert cli.main([*given, "--polarisation", polarisation, "--out", str(out)]) == 0
+        assert f"{commands.OVER}\n" in capsys.readouterr().out
+        assert (out / commands.OVER).read_bytes()[:4] == b"\x89PNG"
+        with xarray.open_dataarray(out / "brdf.nc", engine="h5netcdf") as table:
+            tables[polarisation] = table.load()
+    assert tables["s"].attrs["phase_across_rad"] == pytest.approx(2 * 2 * 3.14159 * 0.2 * 65 / 600, rel=1e-5)
+    assert float(abs(tables["s"] - tables["p"]).max()) > 0.0
+    many = ft.tables.labelled(
+        np.ones((8, 2)), {"seed": (range(8), ""), "wavelength": (WAVES, "m")}, name="brdf", unit="1/sr"
+    )
+    with pytest.raises(ValueError, match="--measured: expected at most 7 spectra to .* over, got 8"):
+        commands._lay_over(many, ft.spectra.load(feathers), tmp_path / "none.png")
+
+
 def test_lattices_in_one_call(tmp_path, capsys, monkeypatch):
     # processes start for seconds; test_sweeps has some
     monkeypatch.setattr(sweeps, "ProcessPoolExecutor", lambda *_, **__: ThreadPoolExecutor(1))
@@ -53,16 +83,20 @@ def test_lattices_in_one_call(tmp_path, capsys, monkeypatch):
     assert len(list((out / "cells").iterdir())) == 4
 
 
-def test_a_feather_by_rigorous_methods(tmp_path, capsys, monkeypatch):
+def test_a_feather_by_rigorous_methods(feathers, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(sweeps, "ProcessPoolExecutor", lambda *_, **__: ThreadPoolExecutor(1))
     given = [
         "lattice", "--columns", "3", "--rows", "2", "--pitch", "150 nm", "--arrangement", "square", *SHORT,
     ]  # fmt: skip
     given += ["--rod", "melanin", "--host", "1.55", "--cortex", "100 nm", "--channel", "10 nm"]
-    assert cli.main([*given, "--method", "rods", "--out", str(tmp_path / "rods")]) == 0
+    rods = [*given, "--method", "rods", "--polarisation", "H", "--out", str(tmp_path / "rods")]
+    assert cli.main(rods) == 0
     assert "not told by this method" in capsys.readouterr().out
-    assert cli.main([*given, "--method", "multilayer", "--out", str(tmp_path / "layers")]) == 0
-    assert "layers 0." in capsys.readouterr().out
+    layered = [*given, "--method", "multilayer", "--measured", feathers, "--out", str(tmp_path / "layers")]
+    assert cli.main(layered) == 0
+    said = capsys.readouterr().out
+    assert "layers 0." in said
+    assert f"{commands.LAYERS}, {commands.OVER}" in said
     with (tmp_path / "layers" / commands.LAYERS).open() as file:
         lines = [float(line["reflectance"]) for line in csv.DictReader(file)]
     layers, rods = lines[: len(lines) // 2], lines[len(lines) // 2 :]
@@ -79,6 +113,9 @@ def test_what_is_refused(rods, tmp_path, capsys):
     assert "--angles: expected a whole number from 1, got 'none'" in capsys.readouterr().err
     assert cli.main([*given, "--method", "waves"]) == 2
     assert "method: expected one of rays" in capsys.readouterr().err
+    assert cli.main(["lattice", "--out", out, "--method", "waves"]) == 2
+    said = capsys.readouterr().err
+    assert "lattice study method: expected rays, diffraction, power or rods, got 'waves'" in said
     assert not (tmp_path / "out").exists()
 
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
 
 if TYPE_CHECKING:
+    from fringetrace.mesh import Mesh
     from fringetrace.rods import Lattice
+    from fringetrace.scene import Scene
+    from fringetrace.studies import Polarised
     from fringetrace.tables import DataArray
 
 # What there is to say, each under a word.
@@ -20,7 +23,11 @@ Lines = list[tuple[str, str]]
 # Samples of a spectrum from 300 to 700 nm: one a nanometre.
 WAVELENGTHS = ("300 nm", "700 nm", "401")
 FILES = ("brdf.nc", "brdf.csv", "spectra.png")
-LAYERS = "reflectance.csv"
+LAYERS, OVER = "reflectance.csv", "measured.png"
+# So many spectra can be told apart beside measured ones.
+CURVES = 7
+# Least amplitudes of branches: of rays that split at each boundary, and of others.
+SPLIT, FAINT = 1e-3, 1e-6
 
 
 def brdf(
@@ -35,14 +42,18 @@ def brdf(
     rays: tuple[int, int] = (1, 2000),
     method: str = "rays",
     reflectance: float = 1.0,
+    material: str | None = None,
+    around: str | None = None,
+    polarisation: str | None = None,
     hemisphere: int = 0,
     feature: str | None = None,
+    measured: Path | None = None,
     threads: int | None = None,
 ) -> Lines:
-    """BRDF of a mesh of mirrors, its normal along z: spectra from each angle into each.
+    """BRDF of a mesh of mirrors or of matter, its normal along z: spectra from each angle into each.
 
     Written to the folder OUT: brdf.nc (labelled, NetCDF), brdf.csv (a row for each pair of angles and
-    wavelength), spectra.png.
+    wavelength), spectra.png; measured.png, if spectra are to be laid over.
 
     Parameters
     ----------
@@ -63,19 +74,25 @@ def brdf(
     method
         rays, diffraction, or power (see `fringetrace.goniometer.brdf`).
     reflectance
-        Of the mesh.
+        Of mirrors.
+    material
+        Index or material, such as melanin, of what the mesh encloses. Default: mirrors.
+    around
+        Of what is around it, such as keratin. Default: a vacuum.
+    polarisation
+        s, p or unpolarised (see `fringetrace.goniometer.brdf`). Default: light of one number a ray.
     hemisphere
         Observe the whole upper hemisphere instead: so many rings, four times as many sectors.
     feature
         Radius of the roundest small parts, to say what rays are worth. Default: half the breadth of the
         smallest connected part of the mesh.
+    measured
+        CSV file of measured reflectances, of the form that pavo writes, see `fringetrace.spectra.load`.
     threads
         Default: one for each core.
     """
     from fringetrace import goniometer, measurement, meshes
     from fringetrace.harmonics import CONDUCTOR
-    from fringetrace.interfaces import Mirror
-    from fringetrace.scene import Scene, Surface
     from fringetrace.validity import validity
 
     sample = meshes.load(mesh, unit=unit)
@@ -86,22 +103,24 @@ def brdf(
     )
     if hemisphere:
         detector = goniometer.Cells(hemisphere, 4 * hemisphere)
-    scene = Scene((Surface(sample, Mirror(reflectance), mesh.stem),))
+    over = _measured(measured)
+    scene = _scene(sample, reflectance, _medium(material), _medium(around))
     folder = Path(f"fringetrace-brdf-{mesh.stem}") if out is None else out
     with measurement.staged(folder) as part:
         table = goniometer.brdf(
             scene, theta, detector, _steps(wavelengths, "--wavelengths", parse_length), method=method,
-            rays=rays, threads=threads,
+            rays=rays, polarisation=polarisation, threads=threads,
+            min_amplitude=SPLIT if scene.surfaces[0].boundary else FAINT,
         )  # fmt: skip
         if radius is not None:
             table.attrs |= validity(radius, float(table.wavelength.max()), CONDUCTOR).attributes
-        _write(table, part)
+        files = _write(table, part, over)
     guess = "" if feature else " (of the mesh's smallest part; --feature says it)"
     return [
         ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
         *_powers(table),
         ("rays", f"{table.attrs['validity']}{guess}"),
-        ("written", f"{folder}: {', '.join(FILES)}"),
+        ("written", f"{folder}: {', '.join(files)}"),
     ]
 
 
@@ -124,6 +143,8 @@ def lattice(
     acceptance: str = "0.64 deg",
     rays: int = 2000,
     method: str = "rays",
+    polarisation: Literal["E", "H", "unpolarised"] | None = None,
+    measured: Path | None = None,
     scheduler: str | None = None,
 ) -> Lines:
     """BRDF of lattices of rods, for every combination of the values given.
@@ -135,27 +156,42 @@ def lattice(
     ----------
     out
         Folder to write to.
-    columns, rows
+    columns
+        Rods in a row.
+    rows
         Of rods.
-    radius, pitch
-        Of rods, and from one to the next.
+    radius
+        Of rods.
+    pitch
+        From one rod to the next.
     arrangement
         square, staggered or hexagonal.
     disorder
         Root mean square of displacements, in pitches.
     seed
         Of the displacements.
-    rod, host
-        Index or material, such as melanin and keratin, of rods and of what is around them. Default: mirrors
-        in a vacuum.
-    cortex, channel
-        Thickness of the host above the rods; radius of air channels amid them.
-    angles, wavelengths, acceptance
+    rod
+        Index or material, such as melanin, of rods. Default: mirrors.
+    host
+        Index or material, such as keratin, of what is around them. Default: a vacuum.
+    cortex
+        Thickness of the host above the rods.
+    channel
+        Radius of air channels amid the rods.
+    angles
         As in `fringetrace brdf`.
+    wavelengths
+        First, last, how many.
+    acceptance
+        Half angle of the cone about each direction.
     method
-        rays, diffraction or power, as in `fringetrace brdf`; rods: rigorous, light with its electric field
-        along them; multilayer: specular reflectance of endless rows, as flat layers of effective index,
-        beside the rigorous one, of one lattice: reflectance.csv alone.
+        rays, diffraction or power, as in `fringetrace brdf`; rods: rigorous; multilayer: specular
+        reflectance of endless rows, as flat layers of effective index, beside the rigorous one, of one
+        lattice: reflectance.csv alone.
+    polarisation
+        E or H, the field along the rods, or unpolarised. Default: E; of multilayer: unpolarised.
+    measured
+        As in `fringetrace brdf`.
     rays
         Across a lattice.
     scheduler
@@ -167,34 +203,36 @@ def lattice(
         "columns": columns, "rows": rows, "radius": radius, "pitch": pitch, "arrangement": arrangement,
         "disorder": disorder, "seed": seed,
     }  # fmt: skip
+    matter: dict[str, Any] = {"rod": rod, "host": host, "cortex": cortex, "channel": channel}
     spoken = dict(given)
     for name in ("radius", "pitch"):
         given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
-    matter = {
-        "rod": _medium(rod), "host": _medium(host),
-        "cortex": 0.0 if cortex is None else parse_length(cortex, "--cortex"),
-        "channel": None if channel is None else parse_length(channel, "--channel"),
-    }  # fmt: skip
-    base = studies.Lattice(**{name: values[0] for name, values in given.items()}, **matter)
+    base = studies.Lattice(
+        **{name: values[0] for name, values in given.items()}, rod=_medium(rod), host=_medium(host),
+        cortex=0.0 if cortex is None else parse_length(cortex, "--cortex"),
+        channel=None if channel is None else parse_length(channel, "--channel"),
+    )  # fmt: skip
     axes = {name: values for name, values in given.items() if len(values) > 1}
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     waves = _steps(wavelengths, "--wavelengths", parse_length)
+    over = _measured(measured)
     if method == "multilayer":
-        return _endless(base, axes, theta[theta >= 0.0], waves, out)
+        return _endless(base, axes, (theta[theta >= 0.0], waves), polarisation or "unpolarised", over, out)
     table = studies.study(
         base, axes, theta, theta, waves, rays=rays,
-        half_angle=parse_angle(acceptance, "--acceptance"), method=method,
+        half_angle=parse_angle(acceptance, "--acceptance"), method=method, polarisation=polarisation or "E",
         folder=os.fspath(out / "cells"), scheduler=scheduler,
     )  # fmt: skip
     with measurement.staged(out) as part:
-        _write(table, part)
+        files = _write(table, part, over)
     count = int(np.prod([len(values) for values in axes.values()]))
-    same = ", ".join(f"{name} {values[0]}" for name, values in spoken.items() if name not in axes)
+    named = [f"{name} {values[0]}" for name, values in spoken.items() if name not in axes]
+    named += [f"{name} {value}" for name, value in matter.items() if value]
     return [
-        ("lattices", f"{count} of {', '.join(axes) or 'one kind'}; {same}"),
+        ("lattices", f"{count}{' of ' if axes else ''}{', '.join(axes)}; {', '.join(named)}"),
         *_powers(table),
         ("rays", f"at worst: {table.attrs['validity']}"),
-        ("written", f"{out}: {', '.join(FILES)}"),
+        ("written", f"{out}: {', '.join(files)}"),
     ]
 
 
@@ -242,24 +280,30 @@ def _medium(text: str | None) -> Any:
         return text
 
 
-def _endless(base: Lattice, axes: dict[str, Any], theta: FloatArray, waves: FloatArray, out: Path) -> Lines:
+def _endless(
+    base: Lattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray], polarisation: Polarised,
+    over: DataArray | None, out: Path,
+) -> Lines:  # fmt: skip
     """Specular spectra of endless rows, layered and rigorous."""
     from fringetrace import measurement, studies, tables
 
     if axes:
         raise ValueError(f"--method multilayer: expected one lattice, got several of {', '.join(axes)}")
-    methods = ("multilayer", "rods")
-    both = [studies.specular(base, theta, waves, method=method) for method in methods]
+    (theta, waves), methods, files = along, ("multilayer", "rods"), [LAYERS]
+    both = [studies.specular(base, *along, method=method, polarisation=polarisation) for method in methods]
     axes = {"method": (list(methods), ""), "theta_i": (theta, "rad"), "wavelength": (waves, "m")}
     table = tables.labelled([one.values for one in both], axes, name="reflectance", unit="1")
     with measurement.staged(out) as part:
         tables.write_rows(table, part / LAYERS)
+        if over is not None:
+            _lay_over(table, over, part / OVER)
+            files.append(OVER)
     top = [one.isel(one.argmax(...)) for one in both]
     said = (f"{float(one):.3g} at {float(one.wavelength) * 1e9:.4g} nm" for one in top)
     return [
         ("largest", "layers {}, rods {}".format(*said)),
         ("rays", str(both[0].attrs["validity"])),
-        ("written", f"{out}: {LAYERS}"),
+        ("written", f"{out}: {', '.join(files)}"),
     ]
 
 
@@ -271,13 +315,70 @@ def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
     return np.linspace(parse(first, what), parse(last, what), int(count))
 
 
-def _write(table: DataArray, folder: Path) -> None:
-    """brdf.nc, brdf.csv, spectra.png."""
+def _scene(sample: Mesh, reflectance: float, material: Any, around: Any) -> Scene:
+    """A mesh of mirrors, or of matter."""
+    from fringetrace.interfaces import Dielectric, Mirror
+    from fringetrace.scene import Scene, Surface
+
+    if material is None:
+        return Scene((Surface(sample, Mirror(reflectance), sample.name),), medium=around)
+    return Scene((Surface(sample, Dielectric(), sample.name, back=material),), medium=around)
+
+
+def _measured(file: Path | None) -> DataArray | None:
+    """Measured spectra, or none."""
+    from fringetrace import tables
+
+    return None if file is None else tables.read_csv(file)
+
+
+def _write(table: DataArray, folder: Path, over: DataArray | None) -> list[str]:
+    """brdf.nc, brdf.csv, spectra.png, and measured.png where there are measured spectra: what was written."""
     from fringetrace import tables, views
 
     tables.write_netcdf(table, folder / "brdf.nc")
     tables.write_rows(table, folder / "brdf.csv")
     views.save(views.spectra(table), folder / "spectra.png")
+    if over is None:
+        return [*FILES]
+    mirrored, shape = _mirrored(table), over / over.max("wavelength")
+    _lay_over(mirrored / mirrored.max("wavelength"), shape, folder / OVER, "each over its largest value")
+    return [*FILES, OVER]
+
+
+def _mirrored(table: DataArray) -> DataArray:
+    """Of a BRDF what goes to the observed direction nearest to the mirror's, of light from 0 and above."""
+    lit = table.sel(theta_i=table.theta_i >= 0.0)
+    near = np.abs(lit.theta_o + lit.theta_i).argmin("theta_o")
+    return lit.isel(phi_i=0, phi_o=0, drop=True).isel(theta_o=near, drop=True)
+
+
+def _lay_over(table: DataArray, over: DataArray, path: Path, label: str = "reflectance") -> None:
+    """A picture of spectra, a curve for each place of a table over wavelengths, and measured ones."""
+    from fringetrace import swatches, views
+
+    others = [str(name) for name in table.dims if name != "wavelength"]
+    varied = [name for name in others if table.sizes[name] > 1]
+    rows = table.transpose(*others, "wavelength").values.reshape(-1, table.sizes["wavelength"])
+    if len(rows) > CURVES:
+        raise ValueError(
+            f"--measured: expected at most {CURVES} spectra to lay measured ones over, got {len(rows)}; "
+            "give fewer --angles, or one lattice"
+        )
+    grids = np.meshgrid(*(table[name].values for name in varied), indexing="ij")
+    labels = [
+        ", ".join(map(_short, varied, place)) for place in zip(*(g.ravel() for g in grids), strict=True)
+    ]
+    ax = swatches.spectrum(rows, table.wavelength.values, labels=labels or [path.stem], measured=over)
+    ax.set_ylabel(label)
+    views.save(ax, path)
+
+
+def _short(name: str, value: Any) -> str:
+    """A parameter for a legend."""
+    if name.startswith("theta"):
+        return f"from {value / degree:.3g}°"
+    return f"{name} {value}" if isinstance(value, str) else f"{name} {value:.3g}"
 
 
 def _powers(table: DataArray) -> Lines:

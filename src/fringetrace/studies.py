@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fringetrace.cylinders import differential_width, scatter
 from fringetrace.detectors import Cones, checked_angles
 from fringetrace.farfield import FATES
-from fringetrace.goniometer import AXES, brdf
+from fringetrace.goniometer import AXES, METHODS, brdf
 from fringetrace.harmonics import Polarisation
 from fringetrace.lattices import spectrum
 from fringetrace.nufft import checked_wavelengths
@@ -247,6 +247,8 @@ def study(
     for name in axes:
         if name not in known:
             raise ValueError(f"lattice study: expected parameters among {', '.join(known)}, got {name!r}")
+    if method not in (*METHODS, "rods"):
+        raise ValueError(f"lattice study method: expected {', '.join(METHODS)} or rods, got {method!r}")
     if polarisation not in ALONG:
         raise ValueError(f"lattice study polarisation: expected {', '.join(ALONG)}, got {polarisation!r}")
     incidence, waves = checked_angles(theta_i, "lattice study theta_i"), checked_wavelengths(wavelengths)
