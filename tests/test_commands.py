@@ -63,7 +63,7 @@ def test_a_mesh_of_matter_in_polarised_light_beside_measured_spectra(rods, feath
     many = ft.tables.labelled(
         np.ones((8, 2)), {"seed": (range(8), ""), "wavelength": (WAVES, "m")}, name="brdf", unit="1/sr"
     )
-    with pytest.raises(ValueError, match="--measured: expected at most 7 spectra to .* over, got 8"):
+    with pytest.raises(ValueError, match=r"--measured: expected at most 7 spectra to .* over, got 8"):
         commands._lay_over(many, ft.spectra.load(feathers), tmp_path / "none.png")
 
 
