@@ -85,8 +85,8 @@ def legs(paths: Paths) -> tuple[Array, Array]:
         Of the light on each segment.
     """
     assert paths.points is not None
-    points = paths.points.astype(EXTENDED)
-    step = np.diff(points, axis=1)
+    assert paths.starts is not None
+    step = paths.points[:, 1:].astype(EXTENDED) - paths.starts
     length = np.sqrt((step**2).sum(axis=2))
     rows, last = np.arange(len(paths)), paths.bounces
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -96,3 +96,21 @@ def test_power_adds_up_and_both_beams_meet():
     assert paths.ledger().error < 1e-12
     assert instrument.mark is not None
     assert np.bincount(instrument.mark.count(paths.detected)).tolist() == [12, 12]
+
+
+def test_recorded_light_goes_straight_on_from_where_the_plates_displace_it():
+    made = bench(delay(0.7), shear=50 * um)
+    paths = made.sampled((5, 5), SODIUM).detected
+    for row in range(len(paths)):
+        step = np.diff(paths.polyline(row), axis=0)
+        aside = np.abs(step[:, 2]) < 1e-9 * np.abs(step).max()
+        assert aside.sum() == 1  # by one of the plates
+        np.testing.assert_allclose(np.abs(step[aside]), [[50 * um, 0, 0]], rtol=1e-9, atol=1e-9 * um)
+        np.testing.assert_allclose(step[~aside, :2], 0.0, atol=1e-9 * um)
+        # the last step leads back to the plane of focus
+        assert paths.lengths[row].sum() == pytest.approx(step[~aside, 2].sum(), rel=1e-9)
+
+
+def test_the_budget_knows_where_light_goes_on():
+    """Roundings of some lengths of tens of micrometres."""
+    assert bench(delay(0.7)).budget(SODIUM).hit < PHASE
