@@ -180,8 +180,7 @@ def normals(bounces: Met) -> FloatArray:
     -------
     (n, 3) float64, unit
     """
-    corners = _corners(bounces)
-    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normal = facing(bounces)
     on = bounces.formed
     if on.any():
         gradient = _level(bounces, on, normal[on])[1]

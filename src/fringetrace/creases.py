@@ -218,8 +218,10 @@ def _lines(paths: Paths) -> Iterator[tuple[FloatArray, Array]]:
             return
         step = paths.points[rows, leg + 1] - paths.starts[rows, leg]
         final = last[rows]
-        step[final] = paths.direction[rows[final]]
         reach = np.where(final, np.inf, np.linalg.norm(step, axis=1))
+        # a leg between touching surfaces may have no length, and passes no edge
+        still = final | (reach == 0.0)
+        step[still] = paths.direction[rows[still]]
         direction = unit(step)
         if leg > 0:
             turned = np.linalg.norm(direction - before[rows], axis=1) > START
