@@ -1,11 +1,18 @@
-"""The pictures of docs/colour.md: swatches, colours against angles, spheres, and a spectrum."""
+"""The pictures of docs/colour.md: swatches, colours against angles, spheres, a spectrum; and what aliases.
 
+python benchmarks/colours.py           draw the pictures
+python benchmarks/colours.py --write   and put what fringes need into docs/colour.md
+"""
+
+import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
+import pages
 from matplotlib.figure import Figure
 
-from fringetrace import bsdf, nm, spectra, swatches, tables, views
+from fringetrace import FringetraceWarning, bsdf, nm, spectra, swatches, tables, um, views
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
 W = spectra.samples(4e-6)
@@ -34,8 +41,46 @@ def rough(theta_i, theta_o, phi_o):
     return 0.12 * spread[..., None] * layers((wi * half).sum(axis=-1)) / np.pi
 
 
+def fringes(path, wavelengths):
+    """Two waves of equal strength."""
+    return np.sin(np.pi * path / wavelengths) ** 2
+
+
+def warned(path, at):
+    """Whether colours of fringes are warned of."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", FringetraceWarning)
+        spectra.xyz(fringes(path, at), at)
+    return bool(said)
+
+
+def aliasing(steps=(1, 2.5, 5, 10), count=600):
+    """From which path difference on fringes are warned of, and the worst that went without."""
+    paths = np.geomspace(0.1, 1000, count) * um
+    fine = np.linspace(360, 830, 47001) * nm
+    exact = spectra.weights(fine)
+    true = np.array([fringes(path, fine) @ exact for path in paths])
+    worst, first = 0.0, {}
+    for step in steps:
+        at = np.arange(360, 830.1, step) * nm
+        weights = spectra.weights(at)
+        told = np.array([warned(path, at) for path in paths])
+        off = abs(fringes(paths[:, None], at) @ weights - true).max(axis=1)
+        worst, first[step] = max(worst, off[~told].max()), paths[told.argmax()] / um
+    return (
+        f"Warned of are fringes of path differences from {first[5]:.0f} µm on at steps of 5 nm, from "
+        f"{first[1]:.0f} µm at 1 nm. Of {count} path differences up to 1 mm, at steps of "
+        f"{', '.join(f'{step:g}' for step in steps)} nm, none with X, Y or Z off by more than {worst:.1g} "
+        "went without a warning."
+    )
+
+
 def main():
     """Draw them all."""
+    said = aliasing()
+    print(said)
+    if "--write" in sys.argv[1:]:
+        pages.write("aliasing", said, pages.DOCS / "colour.md")
     thickness = np.array([50, 100, 150, 200, 250, 300, 400, 500])
     colours = 10 * spectra.xyz(soap(thickness[:, None] * nm), W)
     views.save(swatches.swatches(colours, [f"{d} nm" for d in thickness]), IMAGES / "colour_swatches.png")

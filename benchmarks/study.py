@@ -68,6 +68,15 @@ def rows(data, ours: np.ndarray) -> list[tuple[str, ...]]:
     return table
 
 
+def horizontal(data) -> tuple[int, int]:
+    """Rays that reach the pixel straight above, and others that meet a horizontal facet on their way."""
+    reach, hit = data["det_nrefl"] > 0, data["hit_seg"]
+    level = abs(data["segs"][:, 1] - data["segs"][:, 3]) < 1e-9
+    met = ((hit >= 0) & level[np.maximum(hit, 0)]).any(axis=-1)
+    above = data["theta"] == 0.0
+    return int(reach[:, above].sum()), int((reach[:, ~above] & met[:, None]).sum())
+
+
 def text(data, ours: np.ndarray) -> str:
     """The section of the page."""
     there, seen = (data["det_nrefl"] > 0).sum(axis=2), data["v0_nrec"]
@@ -75,9 +84,11 @@ def text(data, ours: np.ndarray) -> str:
     error = np.abs(ours - data["amp_all"]).max()
     dark = [(i, o) for i, o in np.argwhere((there >= 20) & (seen == 0))]
     names = ", ".join(f"{data['theta'][i]:.0f} to {data['theta'][o]:.0f}" for i, o in dark)
+    up, flat = horizontal(data)
     head = (
-        f"Of {there.sum():,} rays that reach a pixel the listing finds {found.sum():,}, and "
-        f"{seen.sum() - found.sum()} that do not: {1 - found.sum() / there.sum():.1%} are lost. "
+        f"Of {there.sum():,} rays that reach a pixel {up:,} go straight up, and {flat:,} others meet a "
+        f"horizontal facet. The listing finds {found.sum():,} of them all, and "
+        f"{seen.sum() - found.sum()} that do not reach it: {1 - found.sum() / there.sum():.1%} are lost. "
         f"{len(dark)} pairs of 20 rays and more are dark in it: {names} degrees. Ours differ from an "
         f"independent exact tracer's sums by {error:.1g} at most, of up to {data['amp_all'].max():.0f}.\n\n"
         "![Spectra of eight pairs, exact and by the listing](images/study.png)\n\n"

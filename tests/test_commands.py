@@ -26,9 +26,8 @@ def test_a_mesh_to_its_brdf(rods, tmp_path, capsys, extra):
     said = capsys.readouterr().out
     assert "rods.ply: 408 triangles" in said
     assert "reflected" in said
-    # 65 nm at 600 nm: of prisms of 18 sides, 0.985 of it upwards
-    assert "size parameter 0.67" in said
-    assert "estimated from the mesh's parts" in said
+    assert "size parameter 0.681, phase across inf rad: no ray method" in said  # 2 pi 65 / 600
+    assert "of the mesh's smallest part" in said
     assert {file.name for file in out.iterdir()} == set(commands.FILES)
     with xarray.open_dataarray(out / "brdf.nc", engine="h5netcdf") as table:
         assert table.shape[0] == 2
@@ -40,26 +39,25 @@ def test_a_mesh_to_its_brdf(rods, tmp_path, capsys, extra):
 
 @pytest.fixture
 def feathers(tmp_path):
-    (tmp_path / "feathers.csv").write_text("wavelength / nm,blue\n400,0.4\n500,0.2\n600,0.1\n")
-    return tmp_path / "feathers.csv"
+    """In the form of pavo (R)."""
+    rows = [f"{wl},{5 + (wl - 300) / 20:.2f},12.5" for wl in range(300, 701, 10)]
+    (tmp_path / "feathers.csv").write_text("\n".join(['"wl","eye","stem"', *rows]))
+    return str(tmp_path / "feathers.csv")
 
 
-def test_measured_spectra_are_laid_over(rods, feathers, tmp_path, capsys):
-    out = tmp_path / "out"
-    given = ["--unit", "um", "--out", str(out), *SHORT, "--rays", "1", "200", "--measured", str(feathers)]
-    assert cli.main(["brdf", str(rods), *given]) == 0
-    assert "spectra.png, measured.png" in capsys.readouterr().out
-    assert {file.name for file in out.iterdir()} == {*commands.FILES, "measured.png"}
-    feathers.write_text("blue\n1\n")
-    assert cli.main(["brdf", str(rods), *given]) == cli.FAILURE
-    assert "expected a column of wavelengths" in capsys.readouterr().err
-
-
-def test_measured_spectra_beside_layers(feathers, tmp_path, capsys):
-    given = ["--rod", "1.6", "--host", "1.5", "--method", "multilayer", "--measured", str(feathers), *SHORT]
-    assert cli.main(["lattice", "--rows", "2", "--out", str(tmp_path / "out"), *given]) == 0
-    assert "reflectance.csv, measured.png" in capsys.readouterr().out
-    assert (tmp_path / "out" / "measured.png").read_bytes()[:4] == b"\x89PNG"
+def test_a_mesh_of_matter_in_polarised_light_beside_measured_spectra(rods, feathers, tmp_path, capsys):
+    given = ["brdf", str(rods), "--unit", "um", *SHORT, "--rays", "1", "60", "--measured", feathers]
+    given += ["--material", "1.7", "--around", "1.5"]
+    tables = {}
+    for polarisation in ("s", "p"):
+        out = tmp_path / polarisation
+        assert cli.main([*given, "--polarisation", polarisation, "--out", str(out)]) == 0
+        assert f"{commands.OVER}\n" in capsys.readouterr().out
+        assert (out / commands.OVER).read_bytes()[:4] == b"\x89PNG"
+        with xarray.open_dataarray(out / "brdf.nc", engine="h5netcdf") as table:
+            tables[polarisation] = table.load()
+    assert tables["s"].attrs["phase_across_rad"] == pytest.approx(2 * 2 * 3.14159 * 0.2 * 65 / 600, rel=1e-5)
+    assert float(abs(tables["s"] - tables["p"]).max()) > 0.0
 
 
 def test_lattices_in_one_call(tmp_path, capsys, monkeypatch):
@@ -78,16 +76,20 @@ def test_lattices_in_one_call(tmp_path, capsys, monkeypatch):
     assert len(list((out / "cells").iterdir())) == 4
 
 
-def test_a_feather_by_rigorous_methods(tmp_path, capsys, monkeypatch):
+def test_a_feather_by_rigorous_methods(feathers, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(sweeps, "ProcessPoolExecutor", lambda *_, **__: ThreadPoolExecutor(1))
     given = [
         "lattice", "--columns", "3", "--rows", "2", "--pitch", "150 nm", "--arrangement", "square", *SHORT,
     ]  # fmt: skip
     given += ["--rod", "melanin", "--host", "1.55", "--cortex", "100 nm", "--channel", "10 nm"]
-    assert cli.main([*given, "--method", "rods", "--out", str(tmp_path / "rods")]) == 0
+    rods = [*given, "--method", "rods", "--polarisation", "H", "--out", str(tmp_path / "rods")]
+    assert cli.main(rods) == 0
     assert "not told by this method" in capsys.readouterr().out
-    assert cli.main([*given, "--method", "multilayer", "--out", str(tmp_path / "layers")]) == 0
-    assert "layers 0." in capsys.readouterr().out
+    layered = [*given, "--method", "multilayer", "--measured", feathers, "--out", str(tmp_path / "layers")]
+    assert cli.main(layered) == 0
+    said = capsys.readouterr().out
+    assert "layers 0." in said
+    assert f"{commands.LAYERS}, {commands.OVER}" in said
     with (tmp_path / "layers" / commands.LAYERS).open() as file:
         lines = [float(line["reflectance"]) for line in csv.DictReader(file)]
     layers, rods = lines[: len(lines) // 2], lines[len(lines) // 2 :]
@@ -104,6 +106,9 @@ def test_what_is_refused(rods, tmp_path, capsys):
     assert "--angles: expected a whole number from 1, got 'none'" in capsys.readouterr().err
     assert cli.main([*given, "--method", "waves"]) == 2
     assert "method: expected one of rays" in capsys.readouterr().err
+    assert cli.main(["lattice", "--out", out, "--method", "waves"]) == 2
+    said = capsys.readouterr().err
+    assert "lattice study method: expected rays, diffraction, power or rods, got 'waves'" in said
     assert not (tmp_path / "out").exists()
 
 

@@ -5,7 +5,16 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import degree
-from fringetrace.detectors import Cells, Cones, Pixels, checked_angles, everything, far_lengths, towards
+from fringetrace.detectors import (
+    Cells,
+    Cones,
+    Pixels,
+    checked_angles,
+    everything,
+    far_lengths,
+    sides,
+    towards,
+)
 
 ORIGIN = np.zeros(3)
 
@@ -24,6 +33,19 @@ def test_directions():
     assert towards(30 * degree, 0.0) == pytest.approx([0.5, 0.0, np.sqrt(0.75)])
     assert towards(-30 * degree, 90 * degree) == pytest.approx([0.0, -0.5, np.sqrt(0.75)])
     assert towards(np.zeros((2, 1)), np.zeros(3)).shape == (2, 3, 3)
+
+
+@pytest.mark.parametrize("travel", [1.0, -1.0])
+def test_s_lies_flat_and_p_beside_it(travel):
+    """A right-handed frame about the way of light; s is along y in the plane of x and z."""
+    theta, phi = np.array([-0.4, 0.0, 0.9]), np.array([0.0, 0.3, 2.0])
+    axis = towards(theta, phi)
+    frame = sides(axis, phi, travel)
+    assert frame[0, 0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-15)
+    assert frame[:, 0, 2] == pytest.approx(0.0, abs=1e-15)
+    right = np.concatenate([frame, travel * axis[:, None]], axis=1)
+    assert right @ right.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (3, 1, 1)), abs=1e-15)
+    assert np.linalg.det(right) == pytest.approx(1.0)  # p = way x s
 
 
 def test_cells_fill_the_hemisphere():

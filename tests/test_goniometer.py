@@ -5,6 +5,7 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import degree, farfield, goniometer, nm, um
+from fringetrace.films import fresnel
 from fringetrace.goniometer import Cells, Cones, Pixels, amplitudes, brdf, reciprocity
 from fringetrace.guards import FringetraceWarning
 from fringetrace.studies import Lattice
@@ -27,7 +28,7 @@ def test_axes_and_power(rods):
     table = brdf(rods, (THETA, [0.0, 0.5]), Cones(THETA, 1 * degree, [0.0]), WAVES, rays=(2, 500))
     assert table.dims == goniometer.AXES
     assert table.shape == (3, 2, 3, 1, 3)
-    assert table.attrs["units"] == "sr-1"
+    assert table.attrs["units"] == "1/sr"
     assert np.array_equal(table.wavelength, WAVES)
     assert sum(table[name] for name in POWERS).values == pytest.approx(1.0, abs=1e-12)
     assert (table.absorbed > 0.0).all()
@@ -153,7 +154,101 @@ def test_glass_in_a_medium():
     assert sums.values.ravel() == pytest.approx(truth, rel=1e-9)
 
 
-def test_polarised_light_is_refused():
-    beam = ft.Beam((0, 0, 1e-4), (0, 0, -1), (0, 1, 0), (1e-5, 1e-5), (2, 2), polarisation=(1, 0))
-    with pytest.raises(ValueError, match="goniometer: expected light without polarisation"):
-        brdf(mirror(), 0.0, Cones([0.0], 0.01), WAVES, source=lambda theta, phi: beam)
+GOLD = 0.18344 + 3.4332j
+FACES = {"glass": (ft.Dielectric(), 1.5168), "gold": (ft.Metal(), GOLD)}
+
+
+def face(name):
+    interface, index = FACES[name]
+    return ft.Scene([ft.Surface(ft.shapes.plate(20 * um, 20 * um), interface, back=index)])
+
+
+@pytest.mark.parametrize("phi", [0.0, 0.7])
+@pytest.mark.parametrize("name", FACES)
+def test_flat_plates_reflect_s_and_p_as_fresnel_says(name, phi):
+    """By power; in the amplitudes, too, s stays s and p stays p, with their phases."""
+    theta = 56.0 * degree
+    looks = Cones([-theta], 0.01, [phi])
+    given = {"wavelengths": WAVES[:1], "rays": (2, 2), "centre": (0, 0, 0)}
+    r = fresnel(1.0, FACES[name][1], theta)
+    unit = np.cos(theta) * np.pi * np.sin(0.01) ** 2
+    parts = {"s": abs(r.rs) ** 2, "p": abs(r.rp) ** 2}
+    parts["unpolarised"] = 0.5 * (parts["s"] + parts["p"])
+    for polarisation, true in parts.items():
+        table = brdf(face(name), (theta, phi), looks, method="power", polarisation=polarisation, **given)
+        assert table.values.item() * unit == pytest.approx(true, rel=1e-11)
+        assert table.reflected.item() == pytest.approx(true, rel=1e-11)
+        assert table.power_unaccounted < 1e-12
+    sums = [amplitudes(face(name), (theta, phi), looks, polarisation=one, **given) for one in ("s", "p")]
+    assert sums[0].dims == (*goniometer.AXES[:4], "polarisation", "wavelength")
+    area = 400 * um * um * np.cos(theta)
+    found = np.array([one.values.ravel() for one in sums]) / area
+    assert found == pytest.approx(np.diag([r.rs, r.rp]), abs=1e-9)
+
+
+def test_a_jones_vector_an_incidence():
+    """Amplitudes add before they are squared, powers do not; each incidence has its own."""
+    theta = np.array([20.0, 56.0]) * degree
+    jones = np.array([[[0.6, 0.8j]], [[1.0, -1.0]]])
+    table = brdf(
+        face("gold"), theta, Cones(-theta, 0.01), WAVES[:1], method="power", rays=(2, 2), polarisation=jones
+    )
+    r = fresnel(1.0, GOLD, theta)
+    s, p = (np.array([0.36, 0.5]) * abs(r.rs) ** 2, np.array([0.64, 0.5]) * abs(r.rp) ** 2)
+    assert table.reflected.values[:, 0] == pytest.approx(s + p, rel=1e-11)
+    straight = brdf(face("glass"), 0.0, Cones([0.0], 0.01), WAVES, rays=(2, 2), polarisation=(1, 1j))
+    scalar = brdf(face("glass"), 0.0, Cones([0.0], 0.01), WAVES, rays=(2, 2))
+    assert straight.values == pytest.approx(scalar.values, rel=1e-11)
+
+
+def test_a_plane_of_rods_keeps_s_and_p():
+    """Along rods s is along every boundary: what light of one number a ray is."""
+    glass = Lattice(3, 2, rod=1.6, host=1.4)
+    given = {"rays": (1, 60), "min_amplitude": 1e-2, "max_bounces": 6, **glass.lighting}
+    looks = Cones(THETA, 5 * degree)
+    scalar, s, p = (
+        brdf(glass.scene, THETA, looks, WAVES, polarisation=one, **given) for one in (None, "s", "p")
+    )
+    assert s.values == pytest.approx(scalar.values, rel=1e-9, abs=1e-12 * scalar.values.max())
+    assert abs(p - s).max() > 0.1 * s.max()
+
+
+def test_polarised_pixels():
+    """All of a mirror's light falls on one pixel, whatever its polarisation."""
+    looks = Pixels([20 * degree], 1e-3, 100 * um)
+    one, other = (
+        brdf(mirror(), -20 * degree, looks, WAVES, rays=(2, 2), polarisation=which) for which in (None, "p")
+    )
+    assert other.values == pytest.approx(one.values, rel=1e-9)
+
+
+def test_a_source_brings_its_own_polarisation():
+    def source(theta, phi):
+        return ft.Beam((0, 0, 1e-4), (0, 0, -1), (0, 1, 0), (1e-5, 1e-5), (2, 2), polarisation=(1, 0))
+
+    looks = Cones([0.0], 0.01)
+    table = brdf(mirror(), 0.0, looks, WAVES, source=source, method="power")
+    assert table.values.ravel() * np.pi * np.sin(0.01) ** 2 == pytest.approx(1.0, rel=1e-12)
+    with pytest.raises(ValueError, match="expected none beside a source, which has its own"):
+        brdf(mirror(), 0.0, looks, WAVES, source=source, polarisation="s")
+
+
+@pytest.mark.parametrize(
+    ("polarisation", "message"),
+    [
+        ("E", "goniometer polarisation: expected s, p, unpolarised or amplitudes, got 'E'"),
+        ((1, 0, 0), r"expected amplitudes of s and p of shape \(2,\) or \(1, 1, 2\), got \(3,\)"),
+        ((0, 0), "expected finite amplitudes, not both 0, got others"),
+        ((np.nan, 1), "expected finite amplitudes, not both 0, got others"),
+    ],
+)
+def test_polarisations_that_are_none(polarisation, message):
+    with pytest.raises(ValueError, match=message):
+        brdf(mirror(), 0.0, Cones([0.0], 0.01), WAVES, polarisation=polarisation)
+
+
+def test_polarised_tables_are_not_filled_in():
+    with pytest.raises(ValueError, match="reciprocity: expected light without polarisation, got 's'"):
+        brdf(mirror(), [0.0], Cones([0.0], 0.01), WAVES, polarisation="s", reciprocal=True)
+    with pytest.raises(ValueError, match="expected one state of light, got 'unpolarised'"):
+        amplitudes(mirror(), 0.0, Cones([0.0], 0.01), WAVES, polarisation="unpolarised")

@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
+from fringetrace import nm
 from fringetrace.detectors import towards
-from fringetrace.goniometer import Setup, footprint
+from fringetrace.illumination import Setup, breadth, footprint, worth
+from fringetrace.rods import Lattice
 
 CENTRE = np.array([1.0, 2.0, 3.0])
 
@@ -40,3 +42,22 @@ def test_light_of_one_s_own():
     setup = Setup(scene, centre=(0, 0, 1), source=lambda theta, phi: beam)
     assert setup.light(0.1, 0.2) is beam
     assert setup.start(beam) == pytest.approx(4.0)
+
+
+def test_the_breadth_of_the_smallest_part():
+    """Of rods their diameter, of a plate or a shallow relief a side."""
+    assert breadth(Lattice(3, 2).mesh) == pytest.approx(130 * nm, rel=1e-9)
+    assert breadth(ft.shapes.plate(3e-6, 2e-6)) == pytest.approx(2e-6)
+    relief = ft.shapes.height_map(np.array([[0.0, 1e-9], [2e-9, 0.0], [0.0, 0.0]]), 1e-6)
+    assert breadth(relief) > 0.9e-6
+
+
+def test_what_rays_are_worth_is_that_of_the_smallest_part():
+    matter = Lattice(2, 2, rod="melanin", host="keratin", channel=20 * nm)
+    found = worth(matter.scene, 500 * nm)
+    assert found.size_parameter == pytest.approx(matter.validity(500 * nm).size_parameter * 20 / 65, rel=1e-2)
+    assert found.phase < 0.0  # of air
+    mirrors = Lattice(2, 2)
+    found, true = worth(mirrors.scene, 500 * nm), mirrors.validity(500 * nm)
+    assert found.size_parameter == pytest.approx(true.size_parameter, rel=1e-9)
+    assert found.label == true.label

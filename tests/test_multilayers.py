@@ -39,6 +39,13 @@ def test_clear_stacks_keep_power():
     np.testing.assert_allclose(found.reflectance + found.transmittance, 1, rtol=1e-12)
 
 
+def test_thick_metal_is_opaque():
+    """A millimetre of silver: exp(-1e5) of the light would overflow as a cosine."""
+    found = stack([1.0, 1e-3], [1.5, 0.05 + 3.9j], 1.0, 1.5, 500 * nm, 0.3, "E")
+    assert 0.9 < found.reflectance < 1.0
+    assert found.transmittance == 0.0
+
+
 def test_effective_index_lies_between_the_wiener_bounds():
     fraction, index = np.array([0.4, 0.6]), np.array([1.75 + 0j, 1.55])
     e, h = (effective_index(fraction, index, p).real for p in ("E", "H"))

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from fringetrace import degree, nm, um
+from fringetrace.cylinders import efficiencies
 from fringetrace.farfield import FATES
+from fringetrace.films import fresnel
 from fringetrace.goniometer import Cones, brdf
 from fringetrace.materials import KERATIN, MELANIN
 from fringetrace.rods import Lattice
@@ -49,11 +51,35 @@ def absorbed(radius, index, rays):
     return np.mean((1 - back) * (1 - left) / (1 - back * left))
 
 
+def one_rod(radius, index):
+    return Lattice(1, 1, radius=radius, pitch=3 * radius, length=2 * radius, rod=index, sides=36, exact=True)
+
+
 def test_one_rod_absorbs_as_the_geometric_series_says():
-    index, radius = 1.5 + 0.002j, 10 * um
-    rod = Lattice(1, 1, radius=radius, pitch=30 * um, length=20 * um, rod=index, sides=36, exact=True)
+    """Weakly: reflectances of the real index are then right to a part kappa^2, rays to a part kappa / 10."""
+    index, radius = 1.5 + 1e-4j, 10 * um
     true = absorbed(radius, index, 2000)
-    assert powers(rod, rays=2000, min_amplitude=1e-4)["absorbed"] == pytest.approx(true, rel=CUT)
+    found = powers(one_rod(radius, index), rays=2000, min_amplitude=1e-4)
+    assert found["absorbed"] == pytest.approx(true, rel=CUT)
+
+
+def test_a_black_rod_reflects_as_fresnel_says_with_its_complex_index():
+    """Nothing comes through: exp(-30) of the power is the most that any chord leaves."""
+    index, height = 1.5 + 0.0879j, (np.arange(2000) + 0.5) / 1000 - 1
+    true = np.mean(abs(fresnel(1.0, index, np.arcsin(abs(height))).rs) ** 2)
+    found = powers(one_rod(10 * um, index), rays=2000, min_amplitude=1e-3)
+    assert found["reflected"] + found["transmitted"] == pytest.approx(true, rel=1e-9)
+
+
+def test_large_rods_absorb_as_the_rigorous_answer_says():
+    """What rays lack are grazing waves at the rods' edges: a part of (k a)^(-2/3), and better."""
+    index, lacking = 1.5 + 0.1j, []
+    for size in (40, 160):
+        radius = size / (2 * np.pi) * WAVE[0]
+        true = efficiencies(radius, index, 1.0, WAVE[0], "E").absorption.item()
+        lacking.append(true / powers(one_rod(radius, index), rays=1000)["absorbed"].item() - 1)
+    assert 0 < lacking[1] < lacking[0] * 4 ** (-2 / 3)
+    assert lacking[1] < 0.5 * 160 ** (-2 / 3)
 
 
 def test_a_feather_keeps_its_power():

@@ -1,11 +1,13 @@
 """Sweeps: any function over any table, kept, gone on with."""
 
+import os
 import signal
 import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -145,12 +147,40 @@ def test_a_killed_sweep_goes_on_where_it_stopped(tmp_path):
             assert one["result"].tobytes() == other["result"].tobytes()
 
 
+def dies_once(x, marks):
+    """Kills its process at 2, the first time."""
+    mark = Path(marks, "died")
+    if x == 2.0 and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return np.array([x**2, *(int(os.environ.get(name, 0)) for name in sweeps.THREADS)])
+
+
+def test_a_killed_worker_is_told_of_and_the_next_call_goes_on(tmp_path, monkeypatch):
+    for name in sweeps.THREADS:
+        monkeypatch.delenv(name, raising=False)
+    cells = sweeps.grid(x=[1.0, 2.0], marks=[str(tmp_path)])
+    with pytest.raises(RuntimeError, match=r"sweep: failed at {'x': .*}: .* process .* terminated abruptly"):
+        sweeps.sweep(dies_once, cells, tmp_path / "kept", processes=1)
+    assert len(list((tmp_path / "kept").glob("*.npz"))) == 1
+    said = []
+    done = sweeps.sweep(
+        dies_once, cells, tmp_path / "kept", processes=1, progress=lambda *counts: said.append(counts)
+    )
+    assert said == [(1, 2), (2, 2)]
+    found = [result["result"].tolist() for result in done]
+    assert [values[0] for values in found] == [1.0, 4.0]
+    # one process may use all cores; the environment here is as before
+    assert {*found[0][1:], *found[1][1:]} == {os.cpu_count()}
+    assert not set(sweeps.THREADS) & set(os.environ)
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of tornado and dask
-def test_a_cluster_gives_the_same():
+def test_a_cluster_gives_the_same_though_a_worker_is_killed(tmp_path):
     distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        1, threads_per_worker=1, processes=False, dashboard_address=None
-    ) as cluster:
-        done = sweeps.sweep(powers, CELLS, scheduler=cluster.scheduler_address)
-    assert done == [powers(**cell) for cell in CELLS]
+    cells = sweeps.grid(x=[1.0, 2.0, 3.0], marks=[str(tmp_path)])
+    with distributed.LocalCluster(1, threads_per_worker=1, dashboard_address=None) as cluster:
+        done = sweeps.sweep(dies_once, cells, tmp_path / "kept", scheduler=cluster.scheduler_address)
+    assert (tmp_path / "died").exists()
+    assert [result["result"][0].item() for result in done] == [1.0, 4.0, 9.0]

@@ -30,7 +30,7 @@ app = App(
     name="fringetrace",
     version=fringetrace.__version__,
     help="Triangle meshes to full-field interferograms, with a phase you can trust.",
-    default_parameter=Parameter(consume_multiple=True),
+    default_parameter=Parameter(consume_multiple=True, negative_iterable=()),
 )
 app.command(commands.brdf)
 app.command(commands.lattice)

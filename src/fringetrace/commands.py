@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from fringetrace.paths import Paths
     from fringetrace.rods import Lattice
     from fringetrace.scene import Scene
+    from fringetrace.studies import Polarised
     from fringetrace.tables import DataArray
 
 # What there is to say, each under a word.
@@ -23,10 +24,9 @@ Lines = list[tuple[str, str]]
 # Samples of a spectrum from 300 to 700 nm: one a nanometre.
 WAVELENGTHS = ("300 nm", "700 nm", "401")
 FILES = ("brdf.nc", "brdf.csv", "spectra.png")
-LAYERS = "reflectance.csv"
-MEASURED = "measured.png"
-# Part of the largest extent up to which a part counts as flat.
-FLAT = 1e-6
+LAYERS, OVER = "reflectance.csv", "measured.png"
+# Least amplitudes of branches: of rays that split at each boundary, and of others.
+SPLIT, FAINT = 1e-3, 1e-6
 
 
 def brdf(
@@ -41,15 +41,18 @@ def brdf(
     rays: tuple[int, int] = (1, 2000),
     method: str = "rays",
     reflectance: float = 1.0,
+    material: str | None = None,
+    around: str | None = None,
+    polarisation: str | None = None,
     hemisphere: int = 0,
     feature: str | None = None,
     measured: Path | None = None,
     threads: int | None = None,
 ) -> Lines:
-    """BRDF of a mesh of mirrors, its normal along z: spectra from each angle into each.
+    """BRDF of a mesh of mirrors or of matter, its normal along z: spectra from each angle into each.
 
     Written to the folder OUT: brdf.nc (labelled, NetCDF), brdf.csv (a row for each pair of angles and
-    wavelength), spectra.png.
+    wavelength), spectra.png; measured.png, if spectra are to be laid over.
 
     Parameters
     ----------
@@ -70,48 +73,53 @@ def brdf(
     method
         rays, diffraction, or power (see `fringetrace.goniometer.brdf`).
     reflectance
-        Of the mesh.
+        Of mirrors.
+    material
+        Index or material, such as melanin, of what the mesh encloses. Default: mirrors.
+    around
+        Of what is around it, such as keratin. Default: a vacuum.
+    polarisation
+        s, p or unpolarised (see `fringetrace.goniometer.brdf`). Default: light of one number a ray.
     hemisphere
         Observe the whole upper hemisphere instead: so many rings, four times as many sectors.
     feature
-        Radius of the roundest small parts, to say what rays are worth. Default: half of the least extent
-        of any connected part of the mesh.
+        Radius of the roundest small parts, to say what rays are worth. Default: half the breadth of the
+        smallest connected part of the mesh.
     measured
-        CSV file of measured reflectances, to be laid over the spectra towards the mirror's direction
-        (measured.png); a column of wavelengths, then one a sample.
+        CSV file of measured reflectances, of the form that pavo writes, see `fringetrace.spectra.load`.
     threads
         Default: one for each core.
     """
     from fringetrace import goniometer, measurement, meshes
     from fringetrace.harmonics import CONDUCTOR
-    from fringetrace.interfaces import Mirror
-    from fringetrace.scene import Scene, Surface
     from fringetrace.validity import validity
 
     sample = meshes.load(mesh, unit=unit)
-    radius = _extent(sample) / 2.0 if feature is None else parse_length(feature, "--feature")
+    radius = None if feature is None else parse_length(feature, "--feature")
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     detector: goniometer.Cells | goniometer.Cones = goniometer.Cones(
         theta, parse_angle(acceptance, "--acceptance")
     )
     if hemisphere:
         detector = goniometer.Cells(hemisphere, 4 * hemisphere)
-    scene = Scene((Surface(sample, Mirror(reflectance), mesh.stem),))
+    over = _measured(measured)
+    scene = _scene(sample, reflectance, _medium(material), _medium(around))
     folder = Path(f"fringetrace-brdf-{mesh.stem}") if out is None else out
     with measurement.staged(folder) as part:
         table = goniometer.brdf(
             scene, theta, detector, _steps(wavelengths, "--wavelengths", parse_length), method=method,
-            rays=rays, threads=threads,
+            rays=rays, polarisation=polarisation, threads=threads,
+            min_amplitude=SPLIT if scene.surfaces[0].boundary else FAINT,
         )  # fmt: skip
-        worth = validity(radius, float(table.wavelength.max()), CONDUCTOR)
-        table.attrs |= worth.attributes
-        written = _write(table, part, measured)
-    guess = "" if feature else f" (radius {radius:.3g} m estimated from the mesh's parts; --feature says it)"
+        if radius is not None:
+            table.attrs |= validity(radius, float(table.wavelength.max()), CONDUCTOR).attributes
+        files = _write(table, part, over)
+    guess = "" if feature else " (of the mesh's smallest part; --feature says it)"
     return [
         ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
         *_powers(table),
-        ("rays", f"{worth}{guess}"),
-        ("written", f"{folder}: {', '.join(written)}"),
+        ("rays", f"{table.attrs['validity']}{guess}"),
+        ("written", f"{folder}: {', '.join(files)}"),
     ]
 
 
@@ -134,6 +142,7 @@ def lattice(
     acceptance: str = "0.64 deg",
     rays: int = 2000,
     method: str = "rays",
+    polarisation: Literal["E", "H", "unpolarised"] | None = None,
     measured: Path | None = None,
     scheduler: str | None = None,
 ) -> Lines:
@@ -146,27 +155,42 @@ def lattice(
     ----------
     out
         Folder to write to.
-    columns, rows
+    columns
+        Rods in a row.
+    rows
         Of rods.
-    radius, pitch
-        Of rods, and from one to the next.
+    radius
+        Of rods.
+    pitch
+        From one rod to the next.
     arrangement
         square, staggered or hexagonal.
     disorder
         Root mean square of displacements, in pitches.
     seed
         Of the displacements.
-    rod, host
-        Index or material, such as melanin and keratin, of rods and of what is around them. Default: mirrors
-        in a vacuum.
-    cortex, channel
-        Thickness of the host above the rods; radius of air channels amid them.
-    angles, wavelengths, acceptance
+    rod
+        Index or material, such as melanin, of rods. Default: mirrors.
+    host
+        Index or material, such as keratin, of what is around them. Default: a vacuum.
+    cortex
+        Thickness of the host above the rods.
+    channel
+        Radius of air channels amid the rods.
+    angles
         As in `fringetrace brdf`.
+    wavelengths
+        First, last, how many.
+    acceptance
+        Half angle of the cone about each direction.
     method
-        rays, diffraction or power, as in `fringetrace brdf`; rods: rigorous, light with its electric field
-        along them; multilayer: specular reflectance of endless rows, as flat layers of effective index,
-        beside the rigorous one, of one lattice: reflectance.csv alone.
+        rays, diffraction or power, as in `fringetrace brdf`; rods: rigorous; multilayer: specular
+        reflectance of endless rows, as flat layers of effective index, beside the rigorous one, of one
+        lattice: reflectance.csv alone.
+    polarisation
+        E or H, the field along the rods, or unpolarised. Default: E; of multilayer: unpolarised.
+    measured
+        As in `fringetrace brdf`.
     rays
         Across a lattice.
     measured
@@ -180,34 +204,36 @@ def lattice(
         "columns": columns, "rows": rows, "radius": radius, "pitch": pitch, "arrangement": arrangement,
         "disorder": disorder, "seed": seed,
     }  # fmt: skip
+    matter: dict[str, Any] = {"rod": rod, "host": host, "cortex": cortex, "channel": channel}
     spoken = dict(given)
     for name in ("radius", "pitch"):
         given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
-    matter = {
-        "rod": _medium(rod), "host": _medium(host),
-        "cortex": 0.0 if cortex is None else parse_length(cortex, "--cortex"),
-        "channel": None if channel is None else parse_length(channel, "--channel"),
-    }  # fmt: skip
-    base = studies.Lattice(**{name: values[0] for name, values in given.items()}, **matter)
+    base = studies.Lattice(
+        **{name: values[0] for name, values in given.items()}, rod=_medium(rod), host=_medium(host),
+        cortex=0.0 if cortex is None else parse_length(cortex, "--cortex"),
+        channel=None if channel is None else parse_length(channel, "--channel"),
+    )  # fmt: skip
     axes = {name: values for name, values in given.items() if len(values) > 1}
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     waves = _steps(wavelengths, "--wavelengths", parse_length)
+    over = _measured(measured)
     if method == "multilayer":
-        return _endless(base, axes, theta[theta >= 0.0], waves, out, measured)
+        return _endless(base, axes, (theta[theta >= 0.0], waves), polarisation or "unpolarised", over, out)
     table = studies.study(
         base, axes, theta, theta, waves, rays=rays,
-        half_angle=parse_angle(acceptance, "--acceptance"), method=method,
+        half_angle=parse_angle(acceptance, "--acceptance"), method=method, polarisation=polarisation or "E",
         folder=os.fspath(out / "cells"), scheduler=scheduler,
     )  # fmt: skip
     with measurement.staged(out) as part:
-        written = _write(table, part, measured)
+        files = _write(table, part, over)
     count = int(np.prod([len(values) for values in axes.values()]))
-    same = ", ".join(f"{name} {values[0]}" for name, values in spoken.items() if name not in axes)
+    named = [f"{name} {values[0]}" for name, values in spoken.items() if name not in axes]
+    named += [f"{name} {value}" for name, value in matter.items() if value]
     return [
-        ("lattices", f"{count} of {', '.join(axes) or 'one kind'}; {same}"),
+        ("lattices", f"{count}{' of ' if axes else ''}{', '.join(axes)}; {', '.join(named)}"),
         *_powers(table),
         ("rays", f"at worst: {table.attrs['validity']}"),
-        ("written", f"{out}: {', '.join(written)}"),
+        ("written", f"{out}: {', '.join(files)}"),
     ]
 
 
@@ -342,51 +368,32 @@ def _medium(text: str | None) -> Any:
 
 
 def _endless(
-    base: Lattice,
-    axes: dict[str, Any],
-    theta: FloatArray,
-    waves: FloatArray,
-    out: Path,
-    measured: Path | None,
-) -> Lines:
+    base: Lattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray], polarisation: Polarised,
+    over: DataArray | None, out: Path,
+) -> Lines:  # fmt: skip
     """Specular spectra of endless rows, layered and rigorous."""
     from fringetrace import measurement, studies, tables, views
 
     if axes:
         raise ValueError(f"--method multilayer: expected one lattice, got several of {', '.join(axes)}")
-    methods = ("multilayer", "rods")
-    both = [studies.specular(base, theta, waves, method=method) for method in methods]
+    (theta, waves), methods, files = along, ("multilayer", "rods"), [LAYERS]
+    both = [studies.specular(base, *along, method=method, polarisation=polarisation) for method in methods]
     axes = {"method": (list(methods), ""), "theta_i": (theta, "rad"), "wavelength": (waves, "m")}
     table = tables.labelled([one.values for one in both], axes, name="reflectance", unit="1")
     with measurement.staged(out) as part:
         tables.write_rows(table, part / LAYERS)
-        if measured is not None:
+        if over is not None:
             first = table.isel(theta_i=0)
             title = f"light from {float(first.theta_i) / degree:.3g}°"
-            ax = views.spectra(first, measured=tables.read_csv(measured), title=title)
-            views.save(ax, part / MEASURED)
+            views.save(views.spectra(first, measured=over, title=title), part / OVER)
+            files.append(OVER)
     top = [one.isel(one.argmax(...)) for one in both]
     said = (f"{float(one):.3g} at {float(one.wavelength) * 1e9:.4g} nm" for one in top)
     return [
         ("largest", "layers {}, rods {}".format(*said)),
         ("rays", str(both[0].attrs["validity"])),
-        ("written", f"{out}: {LAYERS}" + (f", {MEASURED}" if measured else "")),
+        ("written", f"{out}: {', '.join(files)}"),
     ]
-
-
-def _extent(mesh: Mesh) -> float:
-    """Least extent along x, y or z of any connected part of a mesh that is not flat there, metres."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(mesh.vertices)
-    ends = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
-    part = connected_components(coo_matrix((np.ones(len(ends[0])), ends), (count, count)), directed=False)[1]
-    order = np.argsort(part, kind="stable")
-    first = np.flatnonzero(np.diff(part[order], prepend=-1))
-    reach = (f.reduceat(mesh.vertices[order], first) for f in (np.maximum, np.minimum))
-    extent = np.subtract(*reach)
-    return float(extent[extent > FLAT * extent.max()].min())
 
 
 def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
@@ -397,18 +404,34 @@ def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
     return np.linspace(parse(first, what), parse(last, what), int(count))
 
 
-def _write(table: DataArray, folder: Path, measured: Path | None) -> tuple[str, ...]:
-    """brdf.nc, brdf.csv, spectra.png, and measured.png if there is something to lay over."""
+def _scene(sample: Mesh, reflectance: float, material: Any, around: Any) -> Scene:
+    """A mesh of mirrors, or of matter."""
+    from fringetrace.interfaces import Dielectric, Mirror
+    from fringetrace.scene import Scene, Surface
+
+    if material is None:
+        return Scene((Surface(sample, Mirror(reflectance), sample.name),), medium=around)
+    return Scene((Surface(sample, Dielectric(), sample.name, back=material),), medium=around)
+
+
+def _measured(file: Path | None) -> DataArray | None:
+    """Measured spectra, or none."""
+    from fringetrace import tables
+
+    return None if file is None else tables.read_csv(file)
+
+
+def _write(table: DataArray, folder: Path, over: DataArray | None) -> list[str]:
+    """brdf.nc, brdf.csv, spectra.png, and measured.png where there are measured spectra: what was written."""
     from fringetrace import tables, views
 
-    overlaid = None if measured is None else tables.read_csv(measured)
     tables.write_netcdf(table, folder / "brdf.nc")
     tables.write_rows(table, folder / "brdf.csv")
     views.save(views.overview(table), folder / "spectra.png")
-    if overlaid is None:
-        return FILES
-    views.save(views.mirror_spectra(table, overlaid), folder / MEASURED)
-    return (*FILES, MEASURED)
+    if over is None:
+        return [*FILES]
+    views.save(views.mirror_spectra(table, over), folder / OVER)
+    return [*FILES, OVER]
 
 
 def _powers(table: DataArray) -> Lines:

@@ -40,6 +40,26 @@ def towards(theta: npt.ArrayLike, phi: npt.ArrayLike) -> FloatArray:
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), np.cos(polar)], axis=-1)
 
 
+def sides(axis: npt.ArrayLike, phi: npt.ArrayLike, travel: float = 1.0) -> FloatArray:
+    """Unit vectors of s and p light along an axis of a goniometer: s is horizontal, p = direction x s.
+
+    Parameters
+    ----------
+    axis : (..., 3) float64
+        As of `towards`.
+    phi : (...) float64, radians
+        Its azimuth, which also says what s is straight up.
+    travel : {1, -1}
+        Along the axis, or against it.
+
+    Returns
+    -------
+    (..., 2, 3) float64
+    """
+    s = np.broadcast_to(towards(0.5 * np.pi, np.asarray(phi) + 0.5 * np.pi), np.shape(axis))
+    return np.stack([s, np.cross(travel * np.asarray(axis), s)], axis=-2)
+
+
 def checked_angles(angles: npt.ArrayLike, what: str, most: float | None = None) -> FloatArray:
     """Angles as an array, once they are known to be some.
 

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.detectors import Detector, Pixels, everything
+from fringetrace.detectors import Detector, Pixels, everything, sides, towards
 from fringetrace.illumination import Setup
-from fringetrace.media import materials, needs
+from fringetrace.media import needs
 from fringetrace.nufft import TOLERANCE, checked_wavelengths, spectrum
 from fringetrace.paths import Fate, Paths
-from fringetrace.scene import Scene
+from fringetrace.rays import Rays
+from fringetrace.scene import Beam, Scene
 from fringetrace.trace import stream
 from fringetrace.waves import ComplexArray, FloatArray
-
-if TYPE_CHECKING:
-    from fringetrace.indices import Material
 
 FATES = ("reflected", "transmitted", "missed", "absorbed", "truncated")
 # Rays whose sums are taken at once: 100 MB of paths.
@@ -32,8 +29,9 @@ class Far:
 
     Attributes
     ----------
-    amplitude : (theta, phi, wavelength) complex128, m^2 (rays, where they have no area)
-        Sum of area * amplitude * exp(i k length) over the rays that arrive.
+    amplitude : (theta, phi, parts, wavelength) complex128, m^2 (rays, where they have no area)
+        Sum of area * amplitude * exp(i k length) over the rays that arrive; of one number a ray, or
+        of s and p light, see `detectors.sides`. Powers of several parts add.
     power : (theta, phi, wavelength) float64, m^2 (rays)
         Sum of area * |amplitude|^2 over them.
     rays : (theta, phi) int64
@@ -60,19 +58,9 @@ def _shares(paths: Paths) -> FloatArray:
     return np.array([*sums, ledger.absorbed, ledger.truncated])
 
 
-def _faded(paths: Paths, wavelength: float, absorbing: Mapping[Material, Material]) -> Paths:
-    """Paths through clear media, as the absorption of those that they stand for leaves them."""
-    assert paths.lengths is not None
-    media = [absorbing.get(medium, medium) for medium in materials(paths.scene)]
-    kappa = np.array([complex(medium.index(wavelength)).imag for medium in media])
-    return replace(
-        paths, amplitude=paths.amplitude * np.exp(-2.0 * np.pi / wavelength * (paths.lengths @ kappa))
-    )
-
-
-def _bands(scene: Scene, waves: FloatArray, absorbing: bool) -> list[tuple[float | None, slice]]:
+def _bands(scene: Scene, waves: FloatArray) -> list[tuple[float | None, slice]]:
     """Wavelengths that one trace serves: all of them, or each its own where rays or amplitudes hang on it."""
-    if needs(scene) is None and not absorbing:
+    if needs(scene) is None:
         return [(None, slice(None))]
     return [(float(wave), slice(i, i + 1)) for i, wave in enumerate(waves)]
 
@@ -91,13 +79,9 @@ class _Adding:
     def chunk(
         self, paths: Paths, start: float, waves: FloatArray
     ) -> tuple[ComplexArray, FloatArray, npt.NDArray[np.int64]]:
-        """Amplitudes (theta, phi, wavelength), powers and numbers (theta, phi) of some paths."""
-        if paths.field is not None:
-            raise ValueError(
-                "goniometer: expected light without polarisation, got a field of three components"
-            )
+        """Amplitudes (theta, phi, parts, wavelength), powers and numbers (theta, phi) of some paths."""
         size, centre = self.wanted.shape, np.asarray(self.setup.centre)
-        total = np.zeros((self.wanted.size, len(waves)), dtype=np.complex128)
+        total = np.zeros((self.wanted.size, parts(paths.source), len(waves)), dtype=np.complex128)
         power, count = np.zeros(self.wanted.size), np.zeros(self.wanted.size, dtype=np.int64)
         unit = 1.0 if paths.area is None else paths.area
         arrivals = self.detector.arrivals(paths, centre)
@@ -105,13 +89,53 @@ class _Adding:
             arrivals = everything(paths, self.detector, centre)
         since = 0.0 if isinstance(self.detector, Pixels) else start
         for i, (rows, length) in enumerate(arrivals):
-            amplitude = paths.amplitude[rows]
-            count[i], power[i] = len(rows), unit * (np.abs(amplitude) ** 2).sum()
+            count[i], power[i] = len(rows), unit * (np.abs(paths.amplitude[rows]) ** 2).sum()
             if self.wanted.flat[i] and len(rows):
-                if not self.half_wave_loss:
-                    amplitude = np.where(paths.reflections[rows] % 2 == 1, -amplitude, amplitude)
+                amplitude = self._seen(paths, rows, i)
                 total[i] = unit * spectrum(length - since, amplitude, waves, self.tolerance)
-        return total.reshape(*size, -1), power.reshape(size), count.reshape(size)
+        return total.reshape(*size, *total.shape[1:]), power.reshape(size), count.reshape(size)
+
+    def _seen(self, paths: Paths, rows: npt.NDArray[np.int64], place: int) -> ComplexArray:
+        """(parts, n) amplitudes of some paths, as seen from one of the detector's directions."""
+        amplitude = paths.amplitude[None, rows]
+        if paths.field is not None:
+            theta, phi = (
+                float(angles.flat[place])
+                for angles in np.meshgrid(self.detector.theta, self.detector.phi, indexing="ij")
+            )
+            amplitude = sides(towards(theta, phi), phi) @ paths.field[rows].T
+        if not self.half_wave_loss:
+            amplitude = np.where(paths.reflections[rows] % 2 == 1, -amplitude, amplitude)
+        return amplitude
+
+
+def parts(source: Beam | Rays) -> int:
+    """How many amplitudes light has: one, or those of s and p."""
+    return 1 if source.polarisation is None else 2
+
+
+def mean(fars: Sequence[Far]) -> Far:
+    """Light of several states that do not interfere: the mean of what left.
+
+    Parameters
+    ----------
+    fars : sequence of Far
+        Lit from the same direction by the same power.
+
+    Returns
+    -------
+    Far
+        Parts of the amplitude of all, so scaled that their powers add up to the mean.
+    """
+    if len(fars) == 1:
+        return fars[0]
+    return Far(
+        np.concatenate([far.amplitude for far in fars], axis=2) / np.sqrt(len(fars)),
+        np.mean([far.power for far in fars], axis=0),
+        np.sum([far.rays for far in fars], axis=0),
+        {name: float(np.mean([far.shares[name] for far in fars])) for name in FATES},
+        fars[0].incident,
+    )
 
 
 def far_field(
@@ -122,10 +146,10 @@ def far_field(
     wavelengths: npt.ArrayLike,
     *,
     method: str = "rays",
+    jones: npt.ArrayLike | None = None,
     chosen: npt.NDArray[np.bool_] | None = None,
     max_bounces: int = 100,
     min_amplitude: float = 1e-6,
-    absorbing: Mapping[Material, Material] | None = None,
     max_reflections: int | None = None,
     half_wave_loss: bool = True,
     tolerance: float = TOLERANCE,
@@ -142,12 +166,10 @@ def far_field(
     wavelengths : (w,) float64, metres
     method, max_bounces, min_amplitude, max_reflections, half_wave_loss, tolerance, threads
         See `brdf`.
+    jones : (2,) complex, optional
+        Amplitudes of s and p of the light, see `Setup.light`.
     chosen : (theta, phi) bool, optional
         The directions whose amplitudes are wanted; the others stay 0. Default: all.
-    absorbing : mapping of Material to Material, optional
-        Media of the scene that stand, clear, for others: light is bent and split by their index, and
-        absorbed along its way as those others do. For small parts of weak absorption, inside which rays
-        are reflected many times: waves that fade across their direction are no rays.
 
     Returns
     -------
@@ -155,11 +177,11 @@ def far_field(
     """
     waves, size = checked_wavelengths(wavelengths), (len(detector.theta), len(detector.phi))
     wanted = np.ones(size, dtype=bool) if chosen is None else chosen
-    total = np.zeros((*size, len(waves)), dtype=np.complex128)
+    source = setup.light(theta, phi, jones)
+    total = np.zeros((*size, parts(source), len(waves)), dtype=np.complex128)
     power, count = np.zeros((*size, len(waves))), np.zeros(size, dtype=np.int64)
     shares, incident = np.zeros(len(FATES)), 0.0
-    bands = _bands(setup.scene, waves, bool(absorbing))
-    source = setup.light(theta, phi)
+    bands = _bands(setup.scene, waves)
     adding = _Adding(setup, detector, method, wanted & (method != "power"), half_wave_loss, tolerance)
     for wavelength, band in bands:
         start = setup.start(source, wavelength)
@@ -167,17 +189,11 @@ def far_field(
             setup.scene, source, wavelength=wavelength, max_bounces=max_bounces, min_amplitude=min_amplitude,
             threads=threads, chunk=CHUNK,
         ):  # fmt: skip
-            share, incident = _shares(paths), incident + paths.ledger().incident
-            if absorbing:
-                assert wavelength is not None
-                paths = _faded(paths, wavelength, absorbing)
-                left = _shares(paths)[:3]
-                share = np.array([*left, share[3] + (share[:3] - left).sum(), share[4]])
-            shares += share
+            shares, incident = shares + _shares(paths), incident + paths.ledger().incident
             most = paths if max_reflections is None else paths.where(paths.reflections <= max_reflections)
             sums, powers, counts = adding.chunk(most, start, waves[band])
             total[..., band] += sums
             power[..., band] += powers[..., None]
             count += counts
-    parts = dict(zip(FATES, (shares / incident).tolist(), strict=True))
-    return Far(total, power, count, parts, incident / len(bands))
+    fates = dict(zip(FATES, (shares / incident).tolist(), strict=True))
+    return Far(total, power, count, fates, incident / len(bands))

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.detectors import Cells, Cones, Detector, Pixels, checked_angles
-from fringetrace.farfield import FATES, Far, far_field
+from fringetrace.farfield import FATES, Far, far_field, mean
 from fringetrace.guards import FringetraceWarning
-from fringetrace.illumination import Setup, Source, footprint
+from fringetrace.illumination import Polarisation, Setup, Source, footprint, states, worth
 from fringetrace.nufft import checked_wavelengths
 from fringetrace.scene import Scene
 from fringetrace.tables import array
@@ -68,15 +68,20 @@ def _check_spacing(setup: Setup, waves: FloatArray) -> None:
         )
 
 
+def _squared(far: Far) -> FloatArray:
+    """|amplitude|^2 of all parts together."""
+    return np.asarray((np.abs(far.amplitude) ** 2).sum(axis=2))
+
+
 def _density(far: Far, detector: Detector, waves: FloatArray, method: str) -> FloatArray:
     """(theta, phi, wavelength) float64, 1/sr: power a projected solid angle, over the incident one."""
     projected = detector.projected[..., None]
     if method == "power":
         density = far.power / projected
     elif isinstance(detector, Pixels):
-        density = np.abs(far.amplitude) ** 2 / (detector.width**2 * projected)
+        density = _squared(far) / (detector.width**2 * projected)
     else:
-        density = np.abs(far.amplitude) ** 2 / (waves**2 * np.cos(detector.theta)[:, None, None])
+        density = _squared(far) / (waves**2 * np.cos(detector.theta)[:, None, None])
     return np.asarray(density / far.incident)
 
 
@@ -102,36 +107,47 @@ def amplitudes(
     rays: tuple[int, int] = (256, 256),
     centre: npt.ArrayLike | None = None,
     source: Source | None = None,
+    polarisation: Polarisation = None,
     **options: Any,
 ) -> DataArray:
     """Complex sums of what goes from each direction into each: the BRDF before it is squared.
 
     Parameters
     ----------
-    scene, incidence, detector, wavelengths, method, aperture, rays, centre, source, options
+    scene, incidence, detector, wavelengths, method, aperture, rays, centre, source, polarisation, options
         As in `brdf`.
 
     Returns
     -------
     xarray.DataArray, complex128, m^2 (rays, where a source's rays have no area)
         Axes theta_i, phi_i, theta_o, phi_o, wavelength; sum of area * amplitude * exp(i k length).
-        In the far field lengths are those between the planes through the centre.
+        In the far field lengths are those between the planes through the centre. Of polarised light
+        there is one axis more before the last: polarisation, s and p about the direction of observation.
 
     Raises
     ------
     ValueError
-        As in `brdf`.
+        As in `brdf`; for unpolarised light, which has no amplitude.
     """
     theta, phi = _angles(incidence)
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
     setup = Setup(scene, aperture, rays, centre, source)
-    sums = [
-        [far_field(setup, t, p, detector, waves, method=method, **options).amplitude for p in phi]
-        for t in theta
+    lights = states(polarisation, (len(theta), len(phi)))
+    if len(lights[0]) > 1:
+        raise ValueError(f"amplitudes polarisation: expected one state of light, got {polarisation!r}")
+    pairs = [(t, p) for t in theta for p in phi]
+    fars = [
+        far_field(setup, *pair, detector, waves, method=method, jones=jones, **options)
+        for pair, (jones,) in zip(pairs, lights, strict=True)
     ]
+    sums = np.reshape([far.amplitude for far in fars], (len(theta), len(phi), *fars[0].amplitude.shape))
     unit = {"units": "m2", "long_name": "sum of area * amplitude", "method": method}
-    return array(np.array(sums), AXES, _coordinates(theta, phi, detector, waves), "amplitude", unit)
+    where = _coordinates(theta, phi, detector, waves)
+    if sums.shape[4] == 1:
+        return array(sums[..., 0, :], AXES, where, "amplitude", unit)
+    where["polarisation"] = ("polarisation", ["s", "p"])
+    return array(sums, (*AXES[:4], "polarisation", AXES[4]), where, "amplitude", unit)
 
 
 def brdf(
@@ -145,6 +161,7 @@ def brdf(
     rays: tuple[int, int] = (256, 256),
     centre: npt.ArrayLike | None = None,
     source: Source | None = None,
+    polarisation: Polarisation = None,
     reciprocal: bool = False,
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
@@ -174,15 +191,20 @@ def brdf(
         wavelengths.
     aperture, rays, centre, source
         See `Setup`.
+    polarisation : None, "s", "p", "unpolarised", or (2,) or (a, b, 2) complex
+        None: light of one number a ray, with the amplitudes of light whose field lies along each
+        boundary. Else s lies across the plane of light and normal (at angle 0: across that of `phi`),
+        p = direction x s in it; numbers are amplitudes of s and p, for all or for each incidence.
+        "unpolarised": the mean of s and p, two traces. What is observed is power of any polarisation.
     reciprocal : bool
         Sum only pairs with the second direction at or behind the first, and fill in the others by
-        reciprocity; incidence and detector need the same angles. See `reciprocity`.
+        reciprocity; incidence and detector need the same angles, and light no polarisation, for s may
+        become p and not go back as s. See `reciprocity`.
     progress : callable, optional
         Called with (incidences done, incidences in all).
     options
         max_bounces : int, surfaces that a path may meet, default 100;
         min_amplitude : float, branches below this part of the launched amplitude are cut off, default 1e-6;
-        absorbing : mapping, clear media that stand for absorbing ones, see `farfield.far_field`;
         max_reflections : int, paths with more are left out of the sums, default none;
         half_wave_loss : bool, count the -1 of each reflection, default True;
         tolerance : float, of the sums, see `nufft.spectrum`, default 1e-12;
@@ -195,13 +217,16 @@ def brdf(
         power that were reflected (upwards), transmitted (downwards), missed, absorbed, truncated: they
         add up to 1. `collected` (incidence, wavelength) is what the table itself holds, the BRDF
         summed over its projected solid angles: with "power" and `Cells` it is `reflected`; with
-        `Cones` or `Pixels` it is what falls into them. `ray_count` says how many there were.
+        `Cones` or `Pixels` it is what falls into them. `ray_count` says how many there were. What rays
+        are worth on the smallest part, at the longest wavelength, is among the attributes: size
+        parameter, phase across, error, and in words `validity`.
 
     Raises
     ------
     ValueError
         For angles, wavelengths or lengths out of range, an unknown method, "diffraction" onto pixels,
-        polarised light, or `reciprocal` without the same angles on both sides.
+        a polarisation that is none or beside a source, `reciprocal` without the same angles on both
+        sides or with polarised light.
 
     Notes
     -----
@@ -214,13 +239,20 @@ def brdf(
     if method == "diffraction":
         _check_spacing(setup, waves)
     pairs = [(t, p) for t in theta for p in phi]
+    lights = states(polarisation, (len(theta), len(phi)))
     if reciprocal:
         _check_same(theta, phi, detector)
+        if polarisation is not None and len(lights[0]) == 1:
+            raise ValueError(f"reciprocity: expected light without polarisation, got {polarisation!r}")
     order = np.arange(len(pairs)).reshape(len(theta), len(phi))
     fars = []
     for i, (t, p) in enumerate(pairs):
         chosen = order >= i if reciprocal else None
-        fars.append(far_field(setup, t, p, detector, waves, method=method, chosen=chosen, **options))
+        each = [
+            far_field(setup, t, p, detector, waves, method=method, jones=jones, chosen=chosen, **options)
+            for jones in lights[i]
+        ]
+        fars.append(mean(each))
         if progress is not None:
             progress(i + 1, len(pairs))
     values = np.stack([_density(far, detector, waves, method) for far in fars])
@@ -228,7 +260,8 @@ def brdf(
         square = values.reshape(len(pairs), len(pairs), -1)
         later = np.tri(len(pairs), k=-1, dtype=bool)
         square[later] = square.transpose(1, 0, 2)[later]
-    return _table(values, fars, theta, phi, detector, waves, method)
+    table = _table(values, fars, theta, phi, detector, waves, method)
+    return table.assign_attrs(worth(scene, float(waves.max())).attributes)
 
 
 def _table(
@@ -248,7 +281,7 @@ def _table(
         share = np.reshape([far.shares[name] for far in fars], grid)
         coordinates[name] = (AXES[:2], share, {"units": "1", "long_name": f"power {name} / incident"})
     attributes = {
-        "units": "sr-1", "long_name": "BRDF", "method": method, "detector": type(detector).__name__,
+        "units": "1/sr", "long_name": "BRDF", "method": method, "detector": type(detector).__name__,
         "power_unaccounted": max(abs(sum(far.shares.values()) - 1.0) for far in fars),
     }  # fmt: skip
     return array(values.reshape(*grid, *values.shape[1:]), AXES, coordinates, "brdf", attributes)

@@ -8,12 +8,101 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.detectors import towards
+from fringetrace.detectors import sides, towards
+from fringetrace.harmonics import CONDUCTOR, Index
+from fringetrace.mesh import Mesh
 from fringetrace.rays import Rays, launch
 from fringetrace.scene import Beam, Scene
-from fringetrace.waves import FloatArray, checked_length
+from fringetrace.validity import Validity, validity
+from fringetrace.waves import ComplexArray, FloatArray, checked_length
 
 Source = Callable[[float, float], Beam | Rays]
+# None: light of one number a ray. A name, or amplitudes of s and p, one pair or one an incidence.
+Polarisation = str | npt.ArrayLike | None
+# Amplitudes of s and p; of several the powers' mean is taken.
+NAMED = {"s": ((1, 0),), "p": ((0, 1),), "unpolarised": ((1, 0), (0, 1))}
+
+
+def states(polarisation: Polarisation, shape: tuple[int, int]) -> list[tuple[ComplexArray | None, ...]]:
+    """States of light whose powers make up a polarisation, for each incidence.
+
+    Parameters
+    ----------
+    polarisation : None, "s", "p", "unpolarised", or (2,) or (theta, phi, 2) complex
+    shape : (theta, phi)
+        Counts of incidences.
+
+    Returns
+    -------
+    list of tuples of (2,) complex128, or None for light of one number a ray
+        Amplitudes of s and p; an incidence after the other, theta-major.
+
+    Raises
+    ------
+    ValueError
+        For another name or shape, numbers that are not finite, or amplitudes that are both 0.
+    """
+    count = shape[0] * shape[1]
+    if polarisation is None:
+        return [(None,)] * count
+    if isinstance(polarisation, str):
+        if polarisation not in NAMED:
+            raise ValueError(
+                f"goniometer polarisation: expected {', '.join(NAMED)} or amplitudes, got {polarisation!r}"
+            )
+        return [tuple(np.array(one, np.complex128) for one in NAMED[polarisation])] * count
+    given = np.asarray(polarisation, dtype=np.complex128)
+    if given.shape not in ((2,), (*shape, 2)):
+        raise ValueError(
+            f"goniometer polarisation: expected amplitudes of s and p of shape (2,) or {(*shape, 2)}, "
+            f"got {given.shape}"
+        )
+    if not (np.isfinite(given).all() and given.any(axis=-1).all()):
+        raise ValueError("goniometer polarisation: expected finite amplitudes, not both 0, got others")
+    return [(one,) for one in np.broadcast_to(given, (*shape, 2)).reshape(-1, 2)]
+
+
+def worth(scene: Scene, wavelength: float) -> Validity:
+    """What rays are worth on the smallest part of a scene, taken for a rod, see `fringetrace.validity`.
+
+    Parameters
+    ----------
+    scene : Scene
+    wavelength : float, metres
+        In vacuum.
+
+    Returns
+    -------
+    Validity
+        Of half the `breadth` of a mesh, out of its own matter or a conductor.
+    """
+    around = scene.around
+    found = []
+    for surface in scene.surfaces:
+        index: Index = CONDUCTOR
+        host: Index = around.index
+        if surface.boundary:
+            index, host = ((medium or around).index for medium in (surface.back, surface.front))
+        found.append(validity(0.5 * breadth(surface.mesh), wavelength, index, host))
+    return min(found, key=lambda one: one.size_parameter)
+
+
+def breadth(mesh: Mesh) -> float:
+    """The second largest of the extents along x, y, z of a mesh's connected parts, of the smallest, metres.
+
+    Of rods their diameter; of plates and reliefs, however shallow, a side.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.vertices)
+    ends = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
+    part = connected_components(coo_matrix((np.ones(len(ends[0])), ends), (count, count)), directed=False)[1]
+    order = np.argsort(part, kind="stable")
+    first = np.flatnonzero(np.diff(part[order], prepend=-1))
+    reach = (f.reduceat(mesh.vertices[order], first) for f in (np.maximum, np.minimum))
+    second = np.sort(np.subtract(*reach), axis=1)[:, 1]
+    return float(second[second > 0.0].min())
 
 
 def footprint(
@@ -23,6 +112,7 @@ def footprint(
     shape: tuple[int, int],
     centre: FloatArray,
     reach: float,
+    jones: npt.ArrayLike | None = None,
 ) -> Rays:
     """A plane wave whose rays cross the plane through the sample's centre in the same grid at any angle.
 
@@ -37,6 +127,8 @@ def footprint(
     centre : (3,) float64, metres
     reach : float, metres
         Distance from the centre of the plane across the light that rays start from, with phase 0.
+    jones : (2,) complex, optional
+        Amplitudes of s and p, see `detectors.sides`. None: rays carry one number.
 
     Returns
     -------
@@ -51,7 +143,8 @@ def footprint(
     offset, axis = grid.reshape(-1, 3), towards(theta, phi)
     start = centre + offset + np.outer(reach - offset @ axis, axis)
     area = size[0] * size[1] * abs(np.cos(theta)) / (rows * columns)
-    return Rays(start, np.broadcast_to(-axis, start.shape), area=area)
+    field = None if jones is None else np.asarray(jones, np.complex128) @ sides(axis, phi, -1.0)
+    return Rays(start, np.broadcast_to(-axis, start.shape), area=area, polarisation=field)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,23 +193,32 @@ class Setup:
         boxes = np.stack([surface.mesh.bounds for surface in self.scene.surfaces])
         return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
-    def light(self, theta: float, phi: float) -> Beam | Rays:
+    def light(self, theta: float, phi: float, jones: npt.ArrayLike | None = None) -> Beam | Rays:
         """What falls on the sample from one direction.
 
         Parameters
         ----------
         theta, phi : float, radians
+        jones : (2,) complex, optional
+            See `footprint`.
 
         Returns
         -------
         Beam or Rays
+
+        Raises
+        ------
+        ValueError
+            For a polarisation beside a source, which has its own.
         """
         if self.source is not None:
+            if jones is not None:
+                raise ValueError("goniometer polarisation: expected none beside a source, which has its own")
             return self.source(theta, phi)
         assert self.aperture is not None
         low, high = self.bounds
         reach = float(np.linalg.norm(high - low) + np.hypot(*self.aperture))
-        return footprint(theta, phi, self.aperture, self.rays, np.asarray(self.centre), reach)
+        return footprint(theta, phi, self.aperture, self.rays, np.asarray(self.centre), reach, jones)
 
     def start(self, source: Beam | Rays, wavelength: float | None = None) -> float:
         """Optical path of parallel light from its start to the plane through the centre, across it.

@@ -50,7 +50,7 @@ def stack(
     thickness: ArrayLike, index: ArrayLike, front: ArrayLike, back: ArrayLike, wavelength: ArrayLike,
     angle: ArrayLike, polarisation: Polarisation,
 ) -> Powers:  # fmt: skip
-    """Reflectance and transmittance of flat layers by characteristic matrices (F. Abeles, 1950).
+    """Reflectance and transmittance of flat layers, see `films`, each of its own index at each wavelength.
 
     Parameters
     ----------
@@ -71,23 +71,18 @@ def stack(
     -------
     Powers
     """
+    from fringetrace.layers import shares, stacks
+
     check_polarisation(polarisation)
-    front, back, index = (np.asarray(v, np.complex128) for v in (front, back, index))
-    along = front * np.sin(angle)
-    cosine = np.sqrt(index**2 - along[..., None] ** 2)
-    turn = 2.0 * math.pi * cosine * np.asarray(thickness) / np.asarray(wavelength)[..., None]
-    first, last = (np.sqrt(n**2 - along**2) for n in (front, back))
-    admittance = cosine
-    if polarisation == "H":
-        first, last, admittance = first / front**2, last / back**2, cosine / index**2
-    cos, sin = np.cos(turn), -1j * np.sin(turn)
-    field, slope = np.ones_like(last), last
-    for j in reversed(range(turn.shape[-1])):
-        c, s, q = cos[..., j], sin[..., j], admittance[..., j]
-        field, slope = c * field + s / q * slope, s * q * field + c * slope
-    total = first * field + slope
-    reflected, transmitted = (first * field - slope) / total, 2.0 * first / total
-    return Powers(
-        np.asarray(abs(reflected) ** 2, np.float64),
-        np.asarray(last.real / first.real * abs(transmitted) ** 2, np.float64),
-    )
+    layers, thick = np.asarray(index, np.complex128), np.asarray(thickness, np.float64)
+    flat = [np.asarray(v) for v in (front, back, wavelength, angle)]
+    shape = np.broadcast_shapes(layers.shape[:-1], *(v.shape for v in flat))
+    front, back, wavelength, angle = (np.broadcast_to(v, shape).ravel() for v in flat)
+    layers = np.broadcast_to(layers, (*shape, len(thick))).reshape(-1, len(thick))
+    first, last = np.asarray(front, np.complex128), np.asarray(back, np.complex128)
+    sine2 = (first * np.sin(angle)) ** 2
+    amplitudes = stacks(sine2, first, layers, thick, last, 2.0 * math.pi / wavelength)
+    which = 0 if polarisation == "E" else 1
+    reflected, transmitted = abs(amplitudes[[which, 2 + which]]) ** 2
+    passed = shares(sine2, first, last)[which] * transmitted
+    return Powers(reflected.reshape(shape), passed.reshape(shape))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -148,16 +148,13 @@ class Lattice:
 
     @property
     def scene(self) -> Scene:
-        """The rods as mirrors or as matter; channels, front face and walls of the host.
-
-        Matter is clear here; `lighting` has its absorption.
-        """
+        """The rods as mirrors or as matter; channels, front face and walls of the host."""
         self._check_apart()
-        inside = {} if self.rod is None else {"front": _clear(self.host), "back": _clear(self.rod)}
+        inside = {} if self.rod is None else {"front": self.host, "back": self.rod}
         kind = Mirror(self.reflectance) if self.rod is None else Dielectric()
         surfaces = _surfaces(self, self.centres, self.radius, kind, inside, "rods")
         if self.channel is not None:
-            inside = {"front": _clear(self.host), "back": VACUUM}
+            inside = {"front": self.host, "back": VACUUM}
             surfaces += _surfaces(self, self.channels, self.channel, Dielectric(), inside, "channels")
         if self.host is not None:
             surfaces += _half_space(self)
@@ -165,16 +162,10 @@ class Lattice:
 
     @property
     def lighting(self) -> dict[str, Any]:
-        """What `goniometer.brdf` needs besides the scene: absorption, aperture and centre on a front face."""
-        found: dict[str, Any] = {}
-        media = [
-            medium for medium in (self.rod, self.host) if medium is not None and medium.kappa is not None
-        ]
-        if media:
-            found["absorbing"] = {_clear(medium): medium for medium in media}
-        if self.host is not None:
-            found |= {"aperture": self.footprint, "centre": (_across(self)[0], 0.0, self.front)}
-        return found
+        """What `goniometer.brdf` needs besides the scene: aperture and centre on a host's front face."""
+        if self.host is None:
+            return {}
+        return {"aperture": self.footprint, "centre": (_across(self)[0], 0.0, self.front)}
 
     @property
     def footprint(self) -> tuple[float, float]:
@@ -248,13 +239,6 @@ class Lattice:
             Cylinders(np.concatenate([self.centres, self.channels]), radii, 1.0)
 
 
-def _clear(medium: Material | None) -> Material | None:
-    """A medium without its absorption."""
-    if medium is None or medium.kappa is None:
-        return medium
-    return replace(medium, name=f"{medium.name}, clear", kappa=None)
-
-
 def _prisms(lattice: Lattice, centres: FloatArray, radius: float, name: str) -> Mesh:
     """Rods about axes (n, 2), rod after rod."""
     rod = rod_lattice(1, 1, radius, lattice.pitch, lattice.length, sides=lattice.sides)
@@ -296,6 +280,6 @@ def _half_space(lattice: Lattice) -> list[Surface]:
     walls = np.delete(box.faces, [0, 1, 4, 5], axis=0)  # its first and third side: front and bottom
     front = Mesh(box.vertices, box.faces[:2], "front")
     return [
-        Surface(front, Dielectric(), "front", back=_clear(lattice.host)),
+        Surface(front, Dielectric(), "front", back=lattice.host),
         Surface(Mesh(box.vertices, walls, "walls"), Absorber(), "walls"),
     ]

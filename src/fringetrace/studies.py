@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fringetrace.cylinders import differential_width, scatter
 from fringetrace.detectors import Cones, checked_angles
 from fringetrace.farfield import FATES
-from fringetrace.goniometer import AXES, brdf
+from fringetrace.goniometer import AXES, METHODS, brdf
 from fringetrace.harmonics import Polarisation
 from fringetrace.lattices import spectrum
 from fringetrace.nufft import checked_wavelengths
@@ -29,20 +29,29 @@ if TYPE_CHECKING:
     from fringetrace.tables import DataArray
 
 
+Polarised = Polarisation | Literal["unpolarised"]
+# Materials by name and by index at the wavelengths: names alone do not tell them apart.
+Media = Mapping[tuple[str | None, bytes], "Material"]
+# The field along the rods, as the goniometer says it; s light has the amplitudes of one number a ray.
+ALONG = {"E": None, "H": "p", "unpolarised": "unpolarised"}
+
+
 def _cell(
     theta_i: npt.ArrayLike, theta_o: npt.ArrayLike, half_angle: float, wavelengths: npt.ArrayLike,
-    method: str, rays: int, max_bounces: int, min_amplitude: float, indices: FloatArray,
-    media: Mapping[str, Material], **parameters: Any,
+    method: str, polarisation: Polarised, rays: int, max_bounces: int, min_amplitude: float,
+    indices: npt.NDArray[np.complex128], media: Media, **parameters: Any,
 ) -> dict[str, FloatArray]:  # fmt: skip
     """One lattice: its BRDF in the plane across the rods, and where the power went."""
-    lattice = Lattice(**parameters | {name: media.get(parameters[name]) for name in MEDIA})
+    found = {name: media.get(_known(parameters[name], at)) for name, at in zip(MEDIA, indices, strict=True)}
+    lattice = Lattice(**parameters | found)
     if method == "rods":
-        values = cluster(lattice, theta_i, theta_o, wavelengths)
+        values = cluster(lattice, theta_i, theta_o, wavelengths, polarisation)
         unknown = np.full((len(values), 1), np.nan)
         return {"brdf": values[:, None, :, None], **dict.fromkeys(FATES, unknown)}
     table = brdf(
         lattice.scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths, method=method,
-        rays=(1, rays), max_bounces=max_bounces, min_amplitude=min_amplitude, threads=1, **lattice.lighting,
+        polarisation=ALONG[polarisation], rays=(1, rays), max_bounces=max_bounces,
+        min_amplitude=min_amplitude, threads=1, **lattice.lighting,
     )  # fmt: skip
     return {"brdf": table.values, **{name: table[name].values for name in FATES}}
 
@@ -52,7 +61,7 @@ def cluster(
     theta_i: npt.ArrayLike,
     theta_o: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
-    polarisation: Polarisation = "E",
+    polarisation: Polarised = "E",
 ) -> FloatArray:
     """BRDF of a lattice in the plane across its rods, by rigorous multiple scattering.
 
@@ -68,8 +77,8 @@ def cluster(
     theta_i, theta_o : (n,) radians
         Position angles, outside of the host.
     wavelengths : (w,) float64, metres
-    polarisation : ``"E"`` or ``"H"``
-        The field along the rods. Rays take the amplitudes of "E".
+    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
+        The field along the rods; the mean of both.
 
     Returns
     -------
@@ -80,6 +89,9 @@ def cluster(
     ValueError
         As `cylinders.Cylinders` and `cylinders.scatter`; for mirrors that absorb.
     """
+    if polarisation == "unpolarised":
+        e, h = (cluster(lattice, theta_i, theta_o, wavelengths, each) for each in get_args(Polarisation))
+        return 0.5 * (e + h)
     start, end = checked_angles(theta_i, "cluster theta_i"), checked_angles(theta_o, "cluster theta_o")
     rods, (width, _) = lattice.cylinders, lattice.footprint
     values = []
@@ -111,7 +123,7 @@ def specular(
     wavelengths: npt.ArrayLike,
     *,
     method: str = "rods",
-    polarisation: Polarisation | Literal["unpolarised"] = "unpolarised",
+    polarisation: Polarised = "unpolarised",
 ) -> DataArray:
     """What a lattice of rows that never end reflects, rigorously or as a multilayer.
 
@@ -166,8 +178,13 @@ def _spoken(lattice: Lattice) -> dict[str, Any]:
     }
 
 
+def _known(name: str | None, indices: npt.NDArray[np.complex128]) -> tuple[str | None, bytes]:
+    """A material in `Media`."""
+    return name, np.asarray(indices, np.complex128).tobytes()
+
+
 def _indices(lattice: Lattice, waves: FloatArray) -> npt.NDArray[np.complex128]:
-    """Of rod and host at each wavelength, 0 for none: names alone do not tell materials apart."""
+    """Of rod and host at each wavelength, 0 for none."""
     media = [getattr(lattice, name) for name in MEDIA]
     return np.array([np.zeros(len(waves)) if medium is None else medium.index(waves) for medium in media])
 
@@ -181,6 +198,7 @@ def study(
     *,
     half_angle: float = 1.0 * degree,
     method: str = "rays",
+    polarisation: Polarised = "E",
     rays: int = 2000,
     max_bounces: int = 100,
     min_amplitude: float = 1e-3,
@@ -201,9 +219,11 @@ def study(
     half_angle : float, radians
         Acceptance, see `goniometer.Cones`.
     method, max_bounces
-        See `goniometer.brdf`; or "rods": the rigorous answer in the same unit, see `cluster`, for light
-        with its electric field along the rods. It has no use for half angle, rays and bounces, and does
-        not say where the power went (NaN). For endless rows, and as a multilayer, see `specular`.
+        See `goniometer.brdf`; or "rods": the rigorous answer in the same unit, see `cluster`. It has no
+        use for half angle, rays and bounces, and does not say where the power went (NaN). For endless
+        rows, and as a multilayer, see `specular`.
+    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
+        The field along the rods; the mean of both takes twice the time.
     rays : int
         Across the lattice.
     min_amplitude : float
@@ -227,19 +247,45 @@ def study(
     for name in axes:
         if name not in known:
             raise ValueError(f"lattice study: expected parameters among {', '.join(known)}, got {name!r}")
+    if method not in (*METHODS, "rods"):
+        raise ValueError(f"lattice study method: expected {', '.join(METHODS)} or rods, got {method!r}")
+    if polarisation not in ALONG:
+        raise ValueError(f"lattice study polarisation: expected {', '.join(ALONG)}, got {polarisation!r}")
     incidence, waves = checked_angles(theta_i, "lattice study theta_i"), checked_wavelengths(wavelengths)
     observation = checked_angles(theta_o, "lattice study theta_o")
     fixed = {
         "theta_i": incidence, "theta_o": observation, "half_angle": half_angle, "wavelengths": waves,
-        "method": method, "rays": rays, "max_bounces": max_bounces, "min_amplitude": min_amplitude,
+        "method": method, "polarisation": polarisation, "rays": rays, "max_bounces": max_bounces,
+        "min_amplitude": min_amplitude,
     }  # fmt: skip
     kinds = [replace(lattice, **values) for values in grid(**axes)]
-    media = {m.name: m for kind in kinds for m in (kind.rod, kind.host) if m is not None}
-    cells = [_spoken(kind) | fixed | {"indices": _indices(kind, waves)} for kind in kinds]
+    indices = [_indices(kind, waves) for kind in kinds]
+    media = {
+        _known(medium.name, at): medium
+        for kind, each in zip(kinds, indices, strict=True)
+        for medium, at in zip((kind.rod, kind.host), each, strict=True)
+        if medium is not None
+    }
+    cells = [_spoken(kind) | fixed | {"indices": each} for kind, each in zip(kinds, indices, strict=True)]
     done = sweep(partial(_cell, media=media), cells, folder, **sweeping)
+    attributes = {"method": method, "polarisation": polarisation, "half_angle_rad": half_angle}
+    attributes |= believed(kinds, waves) | {
+        f"lattice_{name}": int(value) if isinstance(value, bool) else value
+        for name, value in _spoken(lattice).items()
+        if name not in axes and value is not None
+    }
+    return _table(done, axes, (incidence, observation, waves), attributes)
+
+
+def _table(
+    done: Sequence[Mapping[str, FloatArray]], axes: Mapping[str, Sequence[Any]],
+    along: tuple[FloatArray, FloatArray, FloatArray], attributes: Mapping[str, Any],
+) -> DataArray:  # fmt: skip
+    """The cells of a study, `along` theta_i, theta_o and wavelength, with the power beside the BRDF."""
+    incidence, observation, waves = along
     shape = tuple(len(values) for values in axes.values())
     coordinates: dict[str, Any] = {
-        name: (name, [str(v) for v in values] if name in MEDIA else list(values))
+        name: (name, [getattr(v, "name", str(v)) for v in values] if name in MEDIA else list(values))
         for name, values in axes.items()
     } | {
         "theta_i": ("theta_i", incidence, {"units": "rad"}),
@@ -252,10 +298,5 @@ def study(
         share = np.stack([one[name] for one in done])
         coordinates[name] = ((*axes, *AXES[:2]), share.reshape(*shape, *share.shape[1:]), {"units": "1"})
     values = np.stack([one["brdf"] for one in done])
-    attributes = {"units": "sr-1", "long_name": "BRDF", "method": method, "half_angle_rad": half_angle}
-    attributes |= believed(kinds, waves) | {
-        f"lattice_{name}": int(value) if isinstance(value, bool) else value
-        for name, value in _spoken(lattice).items()
-        if name not in axes and value is not None
-    }
-    return array(values.reshape(*shape, *values.shape[1:]), (*axes, *AXES), coordinates, "brdf", attributes)
+    unit = {"units": "1/sr", "long_name": "BRDF", **attributes}
+    return array(values.reshape(*shape, *values.shape[1:]), (*axes, *AXES), coordinates, "brdf", unit)

@@ -20,6 +20,8 @@ from fringetrace.waves import Array
 
 Cell = Mapping[str, Any]
 Result = dict[str, Array]
+# Where BLAS, OpenMP and numba read how many threads they may have.
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 # What a function's one array is called in its file.
 ALONE = "result"
 
@@ -137,9 +139,27 @@ def _workers(executor: Executor | None, scheduler: str | None, processes: int | 
             yield cluster
     else:
         # a fork would copy the locks of threads that are not there
-        context = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(processes, mp_context=context) as pool:
+        context, cores = multiprocessing.get_context("spawn"), os.cpu_count() or 1
+        with (
+            _threads(max(1, cores // (processes or cores))),
+            ProcessPoolExecutor(processes, mp_context=context) as pool,
+        ):
             yield pool
+
+
+@contextlib.contextmanager
+def _threads(count: int) -> Iterator[None]:
+    """So many threads for the linear algebra, and other loops, of processes that begin meanwhile.
+
+    Libraries read these at their start, and else take a thread a core in each process.
+    """
+    unsaid = {name: str(count) for name in THREADS if name not in os.environ}
+    os.environ.update(unsaid)
+    try:
+        yield
+    finally:
+        for name in unsaid:
+            os.environ.pop(name, None)
 
 
 def sweep(
@@ -172,7 +192,8 @@ def sweep(
     scheduler : str, optional
         Address of a Dask scheduler, such as "tcp://10.0.0.1:8786"; its workers need fringetrace.
     processes : int, optional
-        Without either, processes of this machine; default one for each core.
+        Without either, processes of this machine; default one for each core. Each has its share of the
+        cores for threads of its libraries.
     progress : callable, optional
         Called with (cells done, cells in all), those read from files first.
 
@@ -186,8 +207,9 @@ def sweep(
     ValueError
         If a parameter cannot be told by its value, or both an executor and a scheduler are given.
     RuntimeError
-        If a scheduler is given but Dask is not installed; or a call failed, or its result is no array
-        of numbers: it names the parameters, its cause is what happened, and what was done before is kept.
+        If a scheduler is given but Dask is not installed; or a call failed, its process was killed, or its
+        result is no array of numbers: it names the parameters, its cause is what happened, and what was
+        done before is kept.
     """
     names = [key(function, cell) for cell in cells]
     place = None if folder is None else Path(folder)
@@ -211,6 +233,12 @@ def sweep(
     return [done[name] for name in names]
 
 
+def _said(cell: Cell) -> dict[str, Any]:
+    """A cell in words: arrays by their shapes."""
+    arrays = {name: value for name, value in cell.items() if isinstance(value, np.ndarray)}
+    return {**cell, **{name: f"array {value.shape}" for name, value in arrays.items()}}
+
+
 def _as_they_come(
     futures: dict[Future[Result], str], cells: Mapping[str, Cell]
 ) -> Iterator[tuple[str, Result]]:
@@ -221,7 +249,7 @@ def _as_they_come(
             try:
                 yield name, future.result()
             except Exception as error:
-                raise RuntimeError(f"sweep: failed at {dict(cells[name])}: {error}") from error
+                raise RuntimeError(f"sweep: failed at {_said(cells[name])}: {error}") from error
     finally:
         for future in futures:
             future.cancel()

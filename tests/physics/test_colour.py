@@ -5,7 +5,8 @@ import pytest
 import tmm
 from scipy import constants
 
-from fringetrace import nm, spectra, um
+import fringetrace as ft
+from fringetrace import films, goniometer, nm, spectra, um
 
 W = np.arange(360, 831, 5) * nm
 # Half a unit of the last digit printed, and as much again for the last digit of the tables.
@@ -68,10 +69,9 @@ def test_newtons_scale_of_colours(path, xyz, rgb):
     assert np.rint(255 * spectra.srgb(found)) == pytest.approx(rgb)
 
 
-def airy(thickness, n, below, at):
-    first, second = (1 - n) / (1 + n), (n - below) / (n + below)
-    turn = np.exp(4j * np.pi * n * thickness / at)
-    return abs((first + second * turn) / (1 + first * second * turn)) ** 2
+def film(thickness, n, below, at):
+    """Reflectance in air, straight on."""
+    return films.reflectance(films.Film(((n, thickness),)), 1.0, below, 0.0, at).s
 
 
 @pytest.mark.parametrize(
@@ -84,14 +84,30 @@ def airy(thickness, n, below, at):
     ],
 )
 def test_a_soap_film(thickness, xyz):
-    found = spectra.xyz(airy(thickness * nm, 1.33, 1.0, W), W)
+    found = spectra.xyz(film(thickness * nm, 1.33, 1.0, W), W)
     assert found == pytest.approx(np.array(xyz), abs=0.1 * PRINTED)
 
 
+def mirrored(surface, at, theta=0.0):
+    """Of a flat sample the power that the goniometer sees where a mirror sends it, unpolarised."""
+    looks = goniometer.Cones([-theta], 0.01)
+    table = goniometer.brdf(
+        ft.Scene([surface]), theta, looks, at, method="power", rays=(1, 1), polarisation="unpolarised"
+    )
+    return table.values.ravel() * looks.projected.item()
+
+
+def test_a_soap_film_under_the_goniometer():
+    """From a traced face with a film on it to a colour."""
+    soap = ft.Dielectric(film=films.Film(((1.33, 300 * nm),)))
+    found = spectra.xyz(mirrored(ft.Surface(ft.shapes.plate(um, um), soap, back=1.0), W), W)
+    assert found == pytest.approx(np.array([0.0515959, 0.0674916, 0.0417282]), abs=0.1 * PRINTED)
+
+
 def test_a_black_film_is_black_and_a_thick_one_white():
-    assert spectra.xyz(airy(5 * nm, 1.33, 1.0, W), W)[1] < 1e-3
+    assert spectra.xyz(film(5 * nm, 1.33, 1.0, W), W)[1] < 1e-3
     at = spectra.samples(2 * 1.33 * 40 * um)
-    thick = spectra.xyz(airy(40 * um, 1.33, 1.0, at), at)
+    thick = spectra.xyz(film(40 * um, 1.33, 1.0, at), at)
     # fringes within every band of the eye: Airy's mean, 2 R / (1 + R) of one face, has no colour
     face = (0.33 / 2.33) ** 2
     assert thick == pytest.approx(2 * face / (1 + face) * spectra.white(), rel=0.01)
@@ -100,8 +116,8 @@ def test_a_black_film_is_black_and_a_thick_one_white():
 def test_oil_on_water_repeats_with_thickness_for_one_colour():
     # 2 n d = wavelength: one wavelength, so the same reflectance as no film at all
     sodium = 589.3 * nm
-    assert airy(sodium / (2 * 1.47), 1.47, 1.33, sodium) == pytest.approx(airy(0.0, 1.47, 1.33, sodium))
-    bare = spectra.xyz(airy(0.0, 1.47, 1.33, W), W)
+    assert film(sodium / (2 * 1.47), 1.47, 1.33, sodium) == pytest.approx(film(0.0, 1.47, 1.33, sodium))
+    bare = spectra.xyz(film(0.0, 1.47, 1.33, W), W)
     assert bare == pytest.approx((0.33 / 2.33) ** 2 * spectra.white(), rel=1e-6)  # 4e-7: E tables
 
 
@@ -121,12 +137,30 @@ def test_a_morpho_stack_turns_bluer_with_the_angle():
     assert 160 < hue[0] < 260
 
 
+def test_a_morpho_stack_under_the_goniometer():
+    """Traced and by the formula of stacks, beside tmm: of a scale its colour too."""
+    scale = films.Film(((1.56, 65 * nm), (1.0, 140 * nm)) * 7 + ((1.56, 65 * nm),))
+    inclined = np.radians(40)
+    true = morpho(inclined)
+    both = films.reflectance(scale, 1.0, 1.0, inclined, W)
+    assert 0.5 * (both.s + both.p) == pytest.approx(true, rel=1e-9)
+    plate = ft.Surface(ft.shapes.plate(um, um), ft.Dielectric(film=scale), back=1.0)
+    found = mirrored(plate, W, inclined)
+    assert found == pytest.approx(true, rel=1e-9)
+    assert spectra.xyz(found, W) == pytest.approx(spectra.xyz(true, W), rel=1e-9)
+
+
 def test_a_grating_shows_the_spectrum_in_order():
-    # sin o = m wavelength / pitch - sin i: at each angle one wavelength of the first order, on the locus
+    """A CD under white light: sin o = m wavelength / pitch - sin i, at each angle one of the first order."""
     pitch, lit = 1.6 * um, np.radians(30)
-    eye = np.arcsin(np.array([450, 550, 650]) * nm / pitch - np.sin(lit))
-    at = pitch * (np.sin(eye) + np.sin(lit))
-    xy = spectra.chromaticity(spectra.observer(2, at))
+    at = np.array([450, 550, 650]) * nm
+    disc = ft.gratings.Grating((1, 0, 0), pitch, orders=(0, 1, 2), reflects=True)
+    scene = ft.Scene([ft.Surface(ft.shapes.plate(20 * um, 20 * um), disc)])
+    looks = goniometer.Cones(np.arcsin(at / pitch - np.sin(lit)), 1e-3)
+    table = goniometer.brdf(scene, lit, looks, at, method="power", rays=(2, 2))
+    seen = table.values[0, 0, :, 0] * looks.projected
+    assert seen == pytest.approx(np.eye(3) / 3, abs=1e-9)  # three orders share the light
+    xy = spectra.chromaticity(seen @ spectra.observer(2, at))
     # the spectrum locus of CIE 1931
     assert xy == pytest.approx(np.array([[0.1566, 0.0177], [0.3016, 0.6923], [0.7260, 0.2740]]), abs=6e-5)
 
