@@ -67,14 +67,15 @@ def gauss_table(orders: Array) -> tuple[FloatArray, FloatArray]:
     Parameters
     ----------
     orders : int64, any shape
-        Which rules are wanted, up to `MOST`.
+        Which rules are wanted.
 
     Returns
     -------
-    nodes, weights : (MOST + 1, MOST) float64
-        Row n is the rule of n points; 0 where it is not wanted.
+    nodes, weights : (n + 1, n) float64
+        n is the largest of `orders`. Row m is the rule of m points; 0 where it is not wanted.
     """
-    nodes, weights = np.zeros((MOST + 1, MOST)), np.zeros((MOST + 1, MOST))
+    most = int(orders.max(initial=1))
+    nodes, weights = np.zeros((most + 1, most)), np.zeros((most + 1, most))
     for n in np.flatnonzero(np.bincount(orders.ravel(), minlength=1)[1:]) + 1:
         at, weight = np.polynomial.legendre.leggauss(n)
         nodes[n, :n], weights[n, :n] = 0.5 + 0.5 * at, 0.5 * weight
@@ -254,7 +255,12 @@ def fringes(slope: FloatArray, carrier: bool) -> FloatArray:
 
 
 def averaged(
-    shape: tuple[int, int], light: Light, period: float, carrier: bool, cuts: Edges | None = None
+    shape: tuple[int, int],
+    light: Light,
+    period: float,
+    carrier: bool,
+    cuts: Edges | None = None,
+    more: int = 0,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Means over the pixels of the fields of some groups, and of their products.
 
@@ -274,6 +280,8 @@ def averaged(
         Whether the mean fields matter: else only fringes between waves are resolved.
     cuts : Edges, optional
         Edges of sheets.
+    more : int
+        Points along either axis beyond those asked for, in every pixel: to see what they are worth.
 
     Returns
     -------
@@ -291,7 +299,9 @@ def averaged(
         bent = _curvature(centre)
         even &= _small(bent, centre)
         centre += bent
-    order = np.where(even, 0, gauss_order(cycles))
+    if more:
+        even[:] = False
+    order = np.where(even, 0, gauss_order(cycles) + more)
     mean, mutual = _sampled(order, light, cuts)
     np.copyto(mean, centre, where=even)
     np.copyto(mutual, product + bend, where=even)
