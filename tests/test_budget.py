@@ -126,6 +126,19 @@ def test_the_same_rays_again_are_the_same(bench):
     np.testing.assert_array_equal(seen.key, same.key)
 
 
+@pytest.mark.parametrize(("faintest", "trips"), [(0.1, 2), (1e-3, 4)])
+def test_light_as_faint_is_followed_again(faintest, trips):
+    """Between faces that send back 0.2 of an amplitude, and the splitter half: 0.2 / 2, 0.19 / 2, 0.0077 / 2."""
+    faces = shapes.plate(8 * mm, 8 * mm)
+    sample = ft.Surface(faces, ft.Dielectric(), "sample", back=1.5)
+    one = instruments.fizeau(sample, aperture=6 * mm, gap=1 * mm, pixels=(4, 4), min_amplitude=faintest)
+    paths = one.trace()
+    twin = again(paths, one.beam.shape)
+    assert twin.min_amplitude == faintest
+    np.testing.assert_array_equal(paths.detected.key, twin.detected.key)
+    assert len(np.unique(paths.key[paths.fate == ft.Fate.DETECTED])) <= trips
+
+
 @pytest.mark.parametrize(
     ("shape", "fitting"), [((10, 10), (10, 10)), ((300, 100), (53, 18)), ((1, 500), (1, 53))]
 )
