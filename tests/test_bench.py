@@ -199,7 +199,9 @@ def test_a_fizeau_is_blocked_at_its_sample():
     alone = one.shut("sample").fields(HENE)
     np.testing.assert_array_equal(alone[0], one.fields(HENE)[0])
     np.testing.assert_array_equal(alone[1:], 0.0)
-    with pytest.raises(ValueError, match="shut: expected an arm that light of the other does not pass, got 'r"):
+    with pytest.raises(
+        ValueError, match="shut: expected an arm that light of the other does not pass, got 'r"
+    ):
         one.shut("reference")
 
 
