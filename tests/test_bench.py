@@ -209,5 +209,5 @@ def test_arms_that_there_are_not_are_refused(bench):
     with pytest.raises(ValueError, match="shut: expected 'reference' or 'sample', got 'source'"):
         bench.shut("source")
     loose = Bench(bench.scene, bench.beam, bench.ccd, reference=bench.reference)
-    with pytest.raises(ValueError, match="shut: expected an arm .*, got 'sample'"):
+    with pytest.raises(ValueError, match=r"shut: expected an arm .*, got 'sample'"):
         loose.shut("sample")

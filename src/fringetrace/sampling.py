@@ -113,7 +113,8 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
     float, waves; see `budget.Budget`
     """
     assert paths.ccd is not None
-    fields, finer = [], []
+    fields: list[ComplexArray] = []
+    finer: list[ComplexArray] = []
     groups = np.zeros(len(paths), dtype=np.int64)
     axes = (None,) if paths.field is None else paths.ccd.axes
     for ccd in bands(paths.ccd):
