@@ -266,7 +266,7 @@ def averaged(
 
     Where light is even its value at the centre will do, with a quarter of a quarter of its curvature:
     the mean of f over a pixel is f + (f_xx + f_yy) / 24 to fourth order (Euler and Maclaurin).
-    Elsewhere there are as many sample points as the fringes ask for.
+    Elsewhere there are as many sample points as the fringes ask for, or what bends as they do.
 
     Parameters
     ----------
@@ -293,14 +293,15 @@ def averaged(
     centre, slope = _centres(shape, light)
     product = mutual_products(centre)
     cycles = fringes(slope, carrier) / period
-    bend = _curvature(product)
-    even = (cycles <= GENTLE) & ~_cut(shape, cuts) & _small(bend, product)
+    bend, cut = _curvature(product), _cut(shape, cuts)
+    even = (cycles <= GENTLE) & ~cut & _small(bend, product)
     if carrier:
         bent = _curvature(centre)
         even &= _small(bent, centre)
         centre += bent
     if more:
         even[:] = False
+    cycles = np.maximum(cycles, np.where(cut, 0.0, _swing(bend, product)))
     order = np.where(even, 0, gauss_order(cycles) + more)
     mean, mutual = _sampled(order, light, cuts)
     np.copyto(mean, centre, where=even)
@@ -340,6 +341,13 @@ def _small(bend: ComplexArray, values: ComplexArray) -> npt.NDArray[np.bool_]:
     small = np.zeros(values.shape, dtype=np.bool_)
     small[1:-1, 1:-1] = (_around(bend) <= BENT * _around(values))[1:-1, 1:-1]
     return small
+
+
+def _swing(bend: ComplexArray, values: ComplexArray) -> FloatArray:
+    """Cycles a pixel of a cosine that bends as much: (2 pi c)^2 / 24 of the largest value around."""
+    bend, values = (np.abs(f).reshape(-1, *f.shape[-2:]).max(axis=0) for f in (bend, values))
+    part = np.divide(bend, values := _around(values), out=np.zeros_like(values), where=values > 0.0)
+    return np.asarray(np.sqrt(24.0 * _around(part)) / (2.0 * np.pi), dtype=np.float64)
 
 
 def _cut(shape: tuple[int, int], cuts: Edges | None) -> npt.NDArray[np.bool_]:
