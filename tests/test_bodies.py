@@ -1,5 +1,8 @@
 """Bodies: their trees, and the planes of their triangles."""
 
+import subprocess
+import sys
+
 import mpmath
 import numpy as np
 import pytest
@@ -33,6 +36,24 @@ def test_the_tree_holds_every_triangle_once_in_boxes_around_it(count):
             assert (local[triangle] >= tree.lower[node]).all()
             assert (local[triangle] <= tree.upper[node]).all()
             node //= 2
+
+
+CROWD = """
+import fringetrace as ft
+from fringetrace.engine import build
+
+sample = ft.Surface(ft.shapes.plate(1.0, 1.0), ft.Mirror())
+bodies = [build(ft.Scene([sample.moved((0.0, 0.0, float(k)))])).bodies[0] for k in range(1100)]
+for body in bodies:
+    body.prepare()
+"""
+
+
+@pytest.mark.slow
+def test_more_scenes_may_be_alive_than_posix_has_keys():
+    # 1024 of them: with one for each scene the interpreter crashes, so in a process of its own
+    done = subprocess.run([sys.executable, "-c", CROWD], capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def normal_of(corners):

@@ -21,67 +21,71 @@ TIE = 1e-12
 
 
 jit = njit(cache=True, nogil=True, error_model="numpy")
+part = njit(cache=True, nogil=True, error_model="numpy", forceinline=True)
+# Triangles in a box, and boxes in a larger one: most are passed by.
+RUN, BOXES = 4, 64
 
 
-@jit
-def _crossing(ox, oy, oz, dx, dy, dz, corner, rim):
-    """Path at which a line crosses a triangle, or infinity (Moeller and Trumbore, 1997)."""
-    ax, ay, az = corner[0, 0], corner[0, 1], corner[0, 2]
-    ux, uy, uz = corner[1, 0] - ax, corner[1, 1] - ay, corner[1, 2] - az
-    vx, vy, vz = corner[2, 0] - ax, corner[2, 1] - ay, corner[2, 2] - az
+@part
+def _crossing(ox, oy, oz, dx, dy, dz, corners, k, rim):
+    """Path at which a line crosses triangle k, or infinity (Moeller and Trumbore, 1997)."""
+    ax, ay, az = corners[k, 0, 0], corners[k, 0, 1], corners[k, 0, 2]
+    ux, uy, uz = corners[k, 1, 0] - ax, corners[k, 1, 1] - ay, corners[k, 1, 2] - az
+    vx, vy, vz = corners[k, 2, 0] - ax, corners[k, 2, 1] - ay, corners[k, 2, 2] - az
     px, py, pz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
     det = ux * px + uy * py + uz * pz
     sx, sy, sz = ox - ax, oy - ay, oz - az
     a = (sx * px + sy * py + sz * pz) / det
     qx, qy, qz = sy * uz - sz * uy, sz * ux - sx * uz, sx * uy - sy * ux
     b = (dx * qx + dy * qy + dz * qz) / det
-    if a >= -rim and b >= -rim and a + b <= 1.0 + rim:
-        return (vx * qx + vy * qy + vz * qz) / det
-    return np.inf
+    inside = a >= -rim and b >= -rim and a + b <= 1.0 + rim
+    return (vx * qx + vy * qy + vz * qz) / det if inside else np.inf
+
+
+@part
+def _entry(ox, oy, oz, fx, fy, fz, box, g):
+    """Path at which a line enters box g, infinity where it passes by; (fx, fy, fz) is 1 / direction."""
+    x, u = (box[g, 0] - ox) * fx, (box[g, 3] - ox) * fx
+    y, v = (box[g, 1] - oy) * fy, (box[g, 4] - oy) * fy
+    z, w = (box[g, 2] - oz) * fz, (box[g, 5] - oz) * fz
+    begin = max(max(min(x, u), min(y, v)), min(z, w))
+    end = min(min(max(x, u), max(y, v)), max(z, w))
+    return np.inf if begin > end or end < 0.0 else begin
 
 
 @jit
-def _enter(ox, oy, oz, dx, dy, dz, lower, upper, entry):
-    """Path at which a line enters each box, infinity where it passes by."""
-    fx, fy, fz = 1.0 / dx, 1.0 / dy, 1.0 / dz
-    for g in range(len(entry)):
-        x, u = (lower[0, g] - ox) * fx, (upper[0, g] - ox) * fx
-        y, v = (lower[1, g] - oy) * fy, (upper[1, g] - oy) * fy
-        z, w = (lower[2, g] - oz) * fz, (upper[2, g] - oz) * fz
-        begin = max(max(min(x, u), min(y, v)), min(z, w))
-        end = min(min(max(x, u), max(y, v)), max(z, w))
-        entry[g] = np.inf if begin > end or end < 0.0 else begin
-
-
-@jit
-def _first_hits(origin, direction, left, corners, lower, upper, group, slack, rim, path, triangle):
-    entry = np.empty(lower.shape[1])
+def _first_hits(origin, direction, left, guess, corners, inner, outer, slack, rim, path, triangle):
     for i in range(len(origin)):
-        ox, oy, oz = origin[i]
-        dx, dy, dz = direction[i]
+        ox, oy, oz = origin[i, 0], origin[i, 1], origin[i, 2]
+        dx, dy, dz = direction[i, 0], direction[i, 1], direction[i, 2]
+        fx, fy, fz = 1.0 / dx, 1.0 / dy, 1.0 / dz
         best, which = np.inf, -1
-        _enter(ox, oy, oz, dx, dy, dz, lower, upper, entry)
-        for g in range(len(entry)):
-            if entry[g] == np.inf or entry[g] > best:
+        if guess[i] >= 0 and guess[i] != left[i]:
+            t = _crossing(ox, oy, oz, dx, dy, dz, corners, guess[i], rim)
+            if slack < t < best:
+                best, which = t, guess[i]
+        for h in range(len(outer)):
+            entry = _entry(ox, oy, oz, fx, fy, fz, outer, h)
+            if entry == np.inf or entry > best:
                 continue
-            for k in range(group[g], group[g + 1]):
-                t = _crossing(ox, oy, oz, dx, dy, dz, corners[k], rim)
-                if slack < t < best and k != left[i]:
-                    best, which = t, k
+            for g in range(h * BOXES, min((h + 1) * BOXES, len(inner))):
+                entry = _entry(ox, oy, oz, fx, fy, fz, inner, g)
+                if entry == np.inf or entry > best:
+                    continue
+                for k in range(g * RUN, min((g + 1) * RUN, len(corners))):
+                    t = _crossing(ox, oy, oz, dx, dy, dz, corners, k, rim)
+                    if slack < t < best and k != left[i]:
+                        best, which = t, k
         path[i], triangle[i] = best, which
 
 
-def _boxes(corners, run):
-    """Boxes (3, g) around runs of triangles, in the order of the mesh: most are passed by."""
-    start = np.arange(0, len(corners), run)
-    low = np.minimum.reduceat(corners.min(axis=1), start)
-    high = np.maximum.reduceat(corners.max(axis=1), start)
-    # wider than any rounding, and no ray starts on a face
-    wide = 1e-6 * (high - low).max(axis=1, keepdims=True)
-    return (low - wide).T.copy(), (high + wide).T.copy(), np.append(start, len(corners))
+def _boxes(low, high, run):
+    """Boxes (g, 6) around runs of boxes, in the order of the mesh: their lower and upper corners."""
+    start = np.arange(0, len(low), run)
+    return np.hstack([np.minimum.reduceat(low, start), np.maximum.reduceat(high, start)])
 
 
-def nearest(corners, origin, direction, left, slack=0.0):
+def nearest(corners, origin, direction, left, slack=0.0, guess=None):
     """First crossing of each ray, over all triangles but the one left.
 
     Parameters
@@ -92,6 +96,8 @@ def nearest(corners, origin, direction, left, slack=0.0):
         Triangle that the ray starts on; -1: none.
     slack : float, metres
         Crossings nearer than this do not count.
+    guess : (n,) int, optional
+        Triangle to begin with: the others only have to be looked at up to there. -1: none.
 
     Returns
     -------
@@ -99,14 +105,21 @@ def nearest(corners, origin, direction, left, slack=0.0):
     triangle : (n,) int64; -1: none
     """
     origin, direction = (np.ascontiguousarray(rows, dtype=np.float64) for rows in (origin, direction))
-    left = np.ascontiguousarray(left, dtype=np.int64)
+    left, guess = (
+        np.ascontiguousarray(rows, dtype=np.int64)
+        for rows in (left, np.full(len(origin), -1) if guess is None else guess)
+    )
     path, triangle = np.empty(len(origin)), np.empty(len(origin), dtype=np.int64)
     corners = np.ascontiguousarray(corners)
-    lower, upper, group = _boxes(corners, 16 if len(corners) < 20000 else 64)
+    inner = _boxes(corners.min(axis=1), corners.max(axis=1), RUN)
+    # wider than any rounding, and no ray starts on a face
+    wide = 1e-6 * (inner[:, 3:] - inner[:, :3]).max(axis=1, keepdims=True)
+    inner += np.hstack([-wide, -wide, -wide, wide, wide, wide])
+    outer = _boxes(inner[:, :3], inner[:, 3:], BOXES)
 
     def some(rows):
         _first_hits(
-            origin[rows], direction[rows], left[rows], corners, lower, upper, group, slack, RIM,
+            origin[rows], direction[rows], left[rows], guess[rows], corners, inner, outer, slack, RIM,
             path[rows], triangle[rows],
         )  # fmt: skip
 
@@ -213,7 +226,7 @@ def judge(paths, begin=0, slack=1e-13):
         long = length > 1e-6 * size
         seen = d.copy()
         seen[long] = step[long] / length[long, None]
-        path, twins = nearest(corners, start, seen, left, slack * size)
+        path, twins = nearest(corners, start, seen, left, slack * size, guess=mine)
         off = np.full(len(rows), np.inf)
         both = met & (twins >= 0)
         off[both] = np.abs(path - length)[both] / way[rows[both]]

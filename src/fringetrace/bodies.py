@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from threading import Lock
 from typing import Any
 
@@ -82,7 +82,7 @@ class Body:
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
-        scene = EmbreeScene(robust=True)
+        scene = EmbreeScene(_device(), robust=True)
         TriangleMesh(scene, self.vertices.astype(np.float32), self.faces.astype(np.int32))
         one = np.zeros((1, 3), dtype=np.float32)
         scene.run(one, one + np.float32(1.0))  # commits, before threads share it
@@ -100,6 +100,16 @@ class Body:
         return (
             self.first, self.stop, self.oriented, self.closed, self.frame, self.planes, self.gentle, tree
         )  # fmt: skip
+
+
+@cache
+def _device() -> Any:
+    """Embree itself, once a process."""
+    # Each takes one of the 1024 keys that POSIX has for data of threads. Beyond these Embree gives none,
+    # and a scene without one ends the interpreter.
+    from embreex.rtcore import EmbreeDevice
+
+    return EmbreeDevice()
 
 
 def _tree(corners: FloatArray, tolerance: float) -> Tree:

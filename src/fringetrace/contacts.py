@@ -85,8 +85,8 @@ def legs(paths: Paths) -> tuple[Array, Array]:
         Of the light on each segment.
     """
     assert paths.points is not None
-    points = paths.points.astype(EXTENDED)
-    step = np.diff(points, axis=1)
+    assert paths.starts is not None
+    step = paths.points[:, 1:].astype(EXTENDED) - paths.starts
     length = np.sqrt((step**2).sum(axis=2))
     rows, last = np.arange(len(paths)), paths.bounces
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -180,8 +180,7 @@ def normals(bounces: Met) -> FloatArray:
     -------
     (n, 3) float64, unit
     """
-    corners = _corners(bounces)
-    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normal = facing(bounces)
     on = bounces.formed
     if on.any():
         gradient = _level(bounces, on, normal[on])[1]

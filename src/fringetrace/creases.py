@@ -204,6 +204,7 @@ def _lines(paths: Paths) -> Iterator[tuple[FloatArray, Array]]:
     assert paths.surface is not None
     assert paths.triangle is not None
     assert paths.points is not None
+    assert paths.starts is not None
     parts = parted(paths.scene)
     offset = np.cumsum([0] + [len(part) for part in parts])
     part = np.concatenate(parts)[(paths.triangle + offset[paths.surface]).clip(0)]
@@ -215,10 +216,12 @@ def _lines(paths: Paths) -> Iterator[tuple[FloatArray, Array]]:
         rows = np.flatnonzero((paths.bounces > leg) | (last & (paths.fate <= Fate.LEFT)))
         if len(rows) == 0:
             return
-        step = paths.points[rows, leg + 1] - paths.points[rows, leg]
+        step = paths.points[rows, leg + 1] - paths.starts[rows, leg]
         final = last[rows]
-        step[final] = paths.direction[rows[final]]
         reach = np.where(final, np.inf, np.linalg.norm(step, axis=1))
+        # a leg between touching surfaces may have no length, and passes no edge
+        still = final | (reach == 0.0)
+        step[still] = paths.direction[rows[still]]
         direction = unit(step)
         if leg > 0:
             turned = np.linalg.norm(direction - before[rows], axis=1) > START
@@ -227,7 +230,7 @@ def _lines(paths: Paths) -> Iterator[tuple[FloatArray, Array]]:
                 number = number * (int(met.max()) + 1) + met
             so_far[rows] = np.unique(number, return_inverse=True)[1]
         before[rows] = direction
-        lines = np.column_stack([paths.points[rows, leg], direction, reach])
+        lines = np.column_stack([paths.starts[rows, leg], direction, reach])
         for group in np.unique(so_far[rows]):
             mine = so_far[rows] == group
             yield lines[mine], paths.ray[rows[mine]]

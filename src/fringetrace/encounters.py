@@ -181,8 +181,8 @@ def _act(plan: Plan, state: _State, number: int, element: Element, record: Recor
         batch.key[to] += digit + np.uint64(further) - np.uint64(2 * number + 2)
         if record is not None:
             record.born(batch.serial[rows[lit]])
-        _write(state, to, branch, lit, plan.faint)
-    _write(state, rows, branches[0], np.arange(len(rows)), plan.faint)
+        _write(state, to, branch, lit, plan.faint, record)
+    _write(state, rows, branches[0], np.arange(len(rows)), plan.faint, record)
 
 
 def _further(plan: Plan, number: int) -> int:
@@ -206,7 +206,9 @@ def _cloned(state: _State, rows: Array) -> Array:
     return to
 
 
-def _write(state: _State, rows: Array, branch: Branch, which: Array, faint: float) -> None:
+def _write(
+    state: _State, rows: Array, branch: Branch, which: Array, faint: float, record: Record | None
+) -> None:
     """Let rows go on as a branch says: `which` of its rows is that of each."""
     batch, field = state.batch, branch.field[which]
     power = _power(field)
@@ -219,6 +221,8 @@ def _write(state: _State, rows: Array, branch: Branch, which: Array, faint: floa
         batch.state[rows, 3:6] = branch.direction[which]
     if branch.point is not None:
         batch.state[rows, :3] = branch.point[which]
+        if record is not None:
+            record.displaced(batch.serial[rows], branch.point[which])
     if branch.path is not None:
         batch.state[rows, 9] += branch.path[which]
     dark = np.where(power > 0.0, FAINT, ABSORBED)

@@ -21,6 +21,17 @@ LEAF = 4
 
 
 @jit
+def grown(table):
+    """The rows of a full table, and as many blank ones after them."""
+    # an array put into a slice would take numba 7 s, for the text of an error that cannot happen
+    larger = np.empty((2 * len(table), table.shape[1]), table.dtype)
+    for row in range(len(table)):
+        for column in range(table.shape[1]):
+            larger[row, column] = table[row, column]
+    return larger
+
+
+@jit
 def select(order, keys, start, stop, middle):
     """Reorder order[start:stop] so that the keys before `middle` are none larger than those after."""
     low, high = start, stop - 1

@@ -113,26 +113,16 @@ def fizeau(
     surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
     layouts.checked_tilt("fizeau", reference_tilt)
     layouts.checked_tilt("fizeau", wedge)
-    top = gap + (0.0 if thickness is None else thickness)
-    if not (
-        math.isfinite(top)
-        and gap > float(surface.mesh.bounds[1, 2])
-        and (thickness is None or thickness > 0.0)
-    ):
-        raise ValueError(
-            f"fizeau gap: expected more than the sample's height, {surface.mesh.bounds[1, 2]:g} m, and a "
-            f"plate of positive thickness, got {gap!r} and {thickness!r}"
-        )
+    top = _checked_top(float(surface.mesh.bounds[1, 2]), gap, thickness)
     arm = ROOM * max(*size, top)
     plates = _plate(
         size, gap, thickness, glass, between, reference_tilt, radius, wedge, (coating, back_coating)
     )
     x, y, z = np.eye(3)
-    crossing = plate(2.0 * SPAN * arm * math.sqrt(2.0), 2.0 * SPAN * arm)
     around = as_material(glass if thickness is None else 1.0)
     scene = Scene(
         (
-            Surface(crossing.moved(turn=rotation(y, math.pi / 4.0)), splitter, "splitter"),
+            Surface(_crossing(SPAN * arm), splitter, "splitter"),
             surface.moved(-arm * z),
             *(face.moved(-arm * z) for face in plates),
         ),
@@ -149,6 +139,23 @@ def fizeau(
         scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, mark=Mark(2, then=1, sense=-1),
         sample=1, immersion=as_material(between), max_bounces=max_bounces, min_amplitude=min_amplitude,
     )  # fmt: skip
+
+
+def _checked_top(height: float, gap: float, thickness: float | None) -> float:
+    """Where the plate ends, metres above z = 0, once it is known to stand over a sample of a height."""
+    top = gap + (0.0 if thickness is None else thickness)
+    if not (math.isfinite(top) and gap > height and (thickness is None or thickness > 0.0)):
+        raise ValueError(
+            f"fizeau gap: expected more than the sample's height, {height:g} m, and a "
+            f"plate of positive thickness, got {gap!r} and {thickness!r}"
+        )
+    return top
+
+
+def _crossing(reach: float) -> Mesh:
+    """A plate in the origin at 45 degrees to x and z, which reaches so far along them and along y."""
+    flat = plate(2.0 * reach * math.sqrt(2.0), 2.0 * reach)
+    return flat.moved(turn=rotation((0.0, 1.0, 0.0), math.pi / 4.0))
 
 
 def _plate(

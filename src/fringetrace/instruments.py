@@ -25,6 +25,8 @@ __all__ = [
     "michelson", "semi_reflecting",
 ]  # fmt: skip
 
+# Twice an aperture is twice that, whatever unit it was multiplied with.
+ROUNDED = 1.0 - 1e-12
 # Parts of the arm: the splitter reaches SPAN up, down and to the sides; an arm is SHORTEST apertures and
 # TALLEST heights of the sample long, or longer. A reference mirror tilted by up to TILT and
 # moved by up to PISTON arms then sends all of its light back through the splitter, and touches nothing.
@@ -150,12 +152,12 @@ def _arm(size: tuple[float, float], arm: float | None, top: float, thick: Splitt
     if thick is not None:
         shortest = ROOMIER * max(*size, thick.thickness)
     arm = max(shortest, TALLEST * top) if arm is None else arm
-    if not (math.isfinite(arm) and arm >= shortest):
+    if not (math.isfinite(arm) and arm >= ROUNDED * shortest):
         raise ValueError(
             f"michelson arm: expected at least {shortest / max(size)} times the aperture, {shortest:g} m, "
             f"got {arm!r}"
         )
-    if not arm >= TALLEST * top:
+    if not arm >= ROUNDED * TALLEST * top:
         raise ValueError(
             f"michelson arm: expected at least {TALLEST} times the sample's height, {TALLEST * top:g} m, "
             f"got {arm!r}; z = 0 is the plane that the camera sees"

@@ -16,6 +16,7 @@ from fringetrace.layouts import Sample
 from fringetrace.polarisers import Polariser, wave_plate
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
 from fringetrace.shapes import plate
+from fringetrace.vectors import unit
 from fringetrace.waves import FloatArray, nm
 
 # Calcite at 589.3 nm, ordinary and extraordinary.
@@ -23,6 +24,8 @@ CALCITE = (1.6584, 1.4864)
 SODIUM = 589.3 * nm
 # Of the polariser, the half-wave plate, the quarter-wave plate.
 HALFWAY = math.pi / 4.0
+# Slope of the rays that tell how deep a plate seems.
+TILT = 1e-4
 
 
 def jamin_lebedeff(
@@ -99,28 +102,20 @@ def jamin_lebedeff(
         raise ValueError(f"jamin_lebedeff shear: expected at least {least:g} m, got {shear!r}")
     space = Scene(surfaces, layouts.surrounding(medium))
     stop = 1.1 * max(deep, abs(plane)) + 0.25 * max(size)
-    plates, moved = _plates(shear, crystal, layouts.real_index(space.around, design), design)
+    plates, moved, depth = _plates(shear, crystal, layouts.real_index(space.around, design), design)
     half = wave_plate((1.0, 1.0, 0.0), 0.5, half_wave)
     wide = 100.0 * (stop + aside + shear)
 
-    def across(z: float, element: Element, name: str) -> Surface:
-        return Surface(plate(wide, wide).moved((0.0, 0.0, z)), element, name)
-
-    quarter = (
-        [across(4.0 * stop, wave_plate((1.0, 1.0, 0.0), 0.25), "quarter-wave plate")] if senarmont else []
-    )
+    ahead: dict[str, tuple[float, Element]] = {"first plate": (-3.0, plates), "half-wave plate": (-2.0, half)}
+    behind: dict[str, tuple[float, Element]] = {
+        "pupil": (2.0, layouts.pupil("jamin_lebedeff", space, na, design)),
+        "second plate": (3.0, plates),
+    }
+    if senarmont:
+        behind["quarter-wave plate"] = (4.0, wave_plate((1.0, 1.0, 0.0), 0.25))
+    behind["analyser"] = (5.0, Polariser(np.array([math.cos(analyser), math.sin(analyser), 0.0])))
     scene = Scene(
-        (
-            across(-3.0 * stop, plates, "first plate"),
-            across(-2.0 * stop, half, "half-wave plate"),
-            *surfaces,
-            across(2.0 * stop, layouts.pupil("jamin_lebedeff", space, na, design), "pupil"),
-            across(3.0 * stop, plates, "second plate"),
-            *quarter,
-            across(
-                5.0 * stop, Polariser(np.array([math.cos(analyser), math.sin(analyser), 0.0])), "analyser"
-            ),
-        ),
+        (*_in_line(ahead, stop, wide), *surfaces, *_in_line(behind, stop, wide)),
         space.medium,
     )
     _, y, z = np.eye(3)
@@ -130,26 +125,42 @@ def jamin_lebedeff(
     )  # fmt: skip
     ccd = CCD(
         centre=6.0 * stop * z + moved, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels,
-        focus=6.0 * stop - plane,
+        focus=6.0 * stop + depth - plane,
     )  # fmt: skip
     return Bench(
         scene, beam, ccd, reference=0, method=method, mark=Mark(0, branch=2), immersion=scene.medium
     )  # fmt: skip
 
 
+def _in_line(train: dict[str, tuple[float, Element]], stop: float, wide: float) -> tuple[Surface, ...]:
+    """Elements across the axis by name, each at so many `stop` along it."""
+    return tuple(
+        Surface(plate(wide, wide).moved((0.0, 0.0, place * stop)), element, name)
+        for name, (place, element) in train.items()
+    )
+
+
 def _plates(
     shear: float, crystal: tuple[Index, Index], index: float, wavelength: float
-) -> tuple[ShearPlate, FloatArray]:
-    """A plate that displaces the extraordinary beam by so much, and its displacement (3,)."""
+) -> tuple[ShearPlate, FloatArray, float]:
+    """A plate that displaces the extraordinary beam by so much; its displacement (3,); how deep it seems.
+
+    A ray that comes in aslant leaves the plate farther aside, as if it had gone on for the depth: the mean of
+    both planes, whose depths differ in a crystal.
+    """
     axis = np.array([1.0, 0.0, 1.0])
-    ray = Meeting(
-        point=np.zeros((1, 3)), direction=np.array([[0.0, 0.0, 1.0]]), normal=np.array([[0.0, 0.0, 1.0]]),
-        index=np.array([index]), field=np.array([[1.0 + 0j, 0.0, 0.0]]), wavelength=wavelength,
+    slopes = TILT * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
+    direction = unit(np.column_stack([slopes, np.ones(len(slopes))]))
+    none = np.zeros((len(slopes), 3))
+    rays = Meeting(
+        point=none, direction=direction, normal=none + np.array([0.0, 0.0, 1.0]), index=np.full(len(slopes), index),
+        field=none + np.array([1.0 + 0j, 0.0, 0.0]), wavelength=wavelength,
     )  # fmt: skip
-    point = ShearPlate(axis, 1.0, *crystal).act(ray)[1].point
+    point = ShearPlate(axis, 1.0, *crystal).act(rays)[1].point
     assert point is not None
-    slope = point[0]
-    size = float(np.abs(slope).max())
+    size = float(np.abs(point[0]).max())
     if not size > 0.0:
         raise ValueError(f"jamin_lebedeff crystal: expected two different indices, got {crystal!r}")
-    return ShearPlate(axis, shear / size, *crystal), slope * (shear / size)
+    thickness = shear / size
+    depth = 0.5 * (point[1, 0] - point[2, 0] + point[3, 1] - point[4, 1]) / (2.0 * TILT)
+    return ShearPlate(axis, thickness, *crystal), point[0] * thickness, float(depth * thickness)

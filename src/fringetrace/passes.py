@@ -56,15 +56,20 @@ class Plan:
 
 
 class Record:
-    """Triangles and points of the paths of a chunk, by serial number: one column for each pass."""
+    """Triangles and points of the paths of a chunk, by serial number: one column for each pass.
+
+    `left` is where light went on from those points; None where it did so from the points themselves.
+    """
 
     def __init__(self, start: FloatArray) -> None:
         self.points = [start.copy()]
+        self.left: list[FloatArray | None] = [None]
         self.triangles: list[Array] = []
 
     def born(self, parents: Array) -> None:
         """Paths that part from others in the pass that was added last."""
         self.points = [np.concatenate([column, column[parents]]) for column in self.points]
+        self.left = [c if c is None else np.concatenate([c, c[parents]]) for c in self.left]
         self.triangles = [np.concatenate([column, column[parents]]) for column in self.triangles]
 
     def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
@@ -75,6 +80,13 @@ class Record:
         met[serials], where[serials] = triangle, point
         self.triangles.append(met)
         self.points.append(where)
+        self.left.append(None)
+
+    def displaced(self, serials: Array, point: FloatArray) -> None:
+        """Paths that go on from elsewhere than where they were in the pass that was added last."""
+        column = self.points[-1].copy() if self.left[-1] is None else self.left[-1]
+        column[serials] = point
+        self.left[-1] = column
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +229,7 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
 
 
 def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
-    """The record of a chunk as the padded tables of `Paths`: surface, triangle, points.
+    """The record of a chunk as the padded tables of `Paths`: surface, triangle, points, departures.
 
     Parameters
     ----------
@@ -229,7 +241,8 @@ def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
     Returns
     -------
     dict of str to array
-        (m, b) int64, (m, b) int64, and (m, b + 2, 3) float64 in metres.
+        (m, b) int64, (m, b) int64, (m, b + 2, 3) float64 in metres; in scenes with thin elements
+        (m, b + 1, 3) float64 in metres, too.
     """
     depth = int(ends.bounces.max(initial=0))
     none = np.full(len(record.points[0]), -1, dtype=np.int64)
@@ -240,4 +253,8 @@ def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
     landed = np.flatnonzero(ends.fate == Fate.DETECTED)
     points[landed, ends.bounces[landed] + 1] = ends.origin[landed]
     local = np.where(triangle >= 0, triangle - plan.engine.offset[surface], -1)
-    return {"surface": surface, "triangle": local, "points": points}
+    found = {"surface": surface, "triangle": local, "points": points}
+    if plan.matter is not None and plan.matter.elements:
+        left = [at if on is None else on for at, on in zip(record.points, record.left, strict=True)]
+        found["departures"] = np.stack(left[: depth + 1], axis=1)[ends.serial]
+    return found

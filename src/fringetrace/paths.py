@@ -90,6 +90,8 @@ class Paths:
         Surface and its triangle at each bounce, padded with -1.
     points : (m, b + 2, 3) float64, metres, or None unless recorded
         Start, hits, and the end on the CCD, padded with NaN.
+    departures : (m, b + 1, 3) float64, metres, or None unless recorded among thin elements
+        Where light went on from the start and each hit: beside it, where an element displaced it.
     wavelength : float or None, metres
         That of the trace, where the scene has media; None: any.
     medium : (m,) int32
@@ -133,6 +135,7 @@ class Paths:
     surface: npt.NDArray[np.int64] | None = None
     triangle: npt.NDArray[np.int64] | None = None
     points: FloatArray | None = None
+    departures: FloatArray | None = None
     wavelength: float | None = None
     medium: npt.NDArray[np.int32] | None = None
     index: FloatArray | None = None
@@ -182,6 +185,13 @@ class Paths:
             pixel[seen] = pixels(self.ccd, self.origin[seen])
         pixel.setflags(write=False)  # kept
         return pixel
+
+    @property
+    def starts(self) -> FloatArray | None:
+        """(m, b + 1, 3) float64, metres: where each segment starts, if recorded; padded with NaN."""
+        if self.departures is not None or self.points is None:
+            return self.departures
+        return self.points[:, :-1]
 
     @property
     def gradient(self) -> FloatArray:
@@ -287,7 +297,8 @@ class Paths:
         Returns
         -------
         (k, 3) float64, metres
-            Start, each hit, and the point on the CCD if it got there.
+            Start, each hit, and the point on the CCD if it got there; where a thin element displaced the
+            light, the point behind it too.
 
         Raises
         ------
@@ -298,7 +309,12 @@ class Paths:
         """
         if self.points is None:
             raise ValueError("polyline: expected paths traced with record=True, got paths without points")
-        points = self.points[self._row(row, "polyline")]
+        row = self._row(row, "polyline")
+        points = self.points[row]
+        if self.departures is not None:
+            left = np.concatenate([self.departures[row], points[-1:]])
+            shown = np.stack([np.ones(len(points), dtype=bool), (left != points).any(axis=1)], axis=1)
+            points = np.stack([points, left], axis=1)[shown]
         return np.asarray(points[np.isfinite(points[:, 0])], dtype=np.float64)
 
     def ledger(self) -> Ledger:
@@ -323,8 +339,9 @@ class Paths:
 
 COLUMNS = (
     "ray", "fate", "bounces", "reflections", "length", "origin", "direction", "amplitude", "lost", "key",
-    "surface", "triangle", "points", "medium", "index", "lengths", "field", "dropped", "bend",
+    "surface", "triangle", "points", "departures", "medium", "index", "lengths", "field", "dropped", "bend",
 )  # fmt: skip
+RECORDED = ("surface", "triangle", "points", "departures")
 
 
 def pixels(ccd: CCD, point: FloatArray) -> FloatArray:
@@ -407,7 +424,7 @@ def join(parts: Sequence[Paths]) -> Paths:
         arrays = [getattr(part, name) for part in parts]
         if arrays[0] is None:
             continue
-        if name in ("surface", "triangle", "points"):
+        if name in RECORDED:
             columns[name] = _padded(arrays, max(array.shape[1] for array in arrays))
         else:
             columns[name] = np.concatenate(arrays)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.exact import jit, part
+from fringetrace.exact import grown, jit, part
 
 # Columns of a leaf.
 CELL, S0, S1, T0, T1, SIGN, LEFT, RIGHT, LOW, HIGH, A, B, C = range(13)
@@ -79,7 +79,9 @@ def split(cells, domain, lines, rows, columns):
     count = 0
     stack = np.empty((4 * DEPTH + 8, 5))
     for cell in range(len(cells)):
-        stack[0, :4], stack[0, 4] = domain[cell], 0.0
+        for k in range(4):
+            stack[0, k] = domain[cell, k]
+        stack[0, 4] = 0.0
         waiting = 1
         while waiting > 0:
             waiting -= 1
@@ -103,13 +105,13 @@ def split(cells, domain, lines, rows, columns):
                         waiting += 1
                 continue
             if count == len(leaves):
-                larger = np.empty((2 * count, 13))
-                larger[:count] = leaves
-                leaves = larger
-            leaves[count, :5] = np.array([float(cell), s0, s1, t0, t1])
+                leaves = grown(leaves)
             more = 0.0 if even else 0.1 * max(right - left, high - low)
-            leaves[count, 5:10] = np.array([sign, left - more, right + more, low - more, high + more])
-            leaves[count, 10:] = lines[cell]
+            leaf = leaves[count]
+            leaf[CELL], leaf[S0], leaf[S1], leaf[T0], leaf[T1], leaf[SIGN] = cell, s0, s1, t0, t1, sign
+            leaf[LEFT], leaf[RIGHT] = left - more, right + more
+            leaf[LOW], leaf[HIGH] = low - more, high + more
+            leaf[A], leaf[B], leaf[C] = lines[cell, 0], lines[cell, 1], lines[cell, 2]
             count += 1
     return leaves[:count]
 

@@ -64,23 +64,26 @@ def made(s, p, dx, dy, dz, sx, sy, sz):
 
 
 @part
-def power(scalar, ex, ey, ez, polarised):
-    """What a ray carries."""
+def power(field, polarised):
+    """What a ray carries; its field is a scalar and a vector, one of which is 0."""
+    scalar, ex, ey, ez = field
     return square(ex) + square(ey) + square(ez) if polarised else square(scalar)
 
 
 @part
-def damped(scalar, ex, ey, ez, factor):
+def damped(field, factor):
     """A field times a factor."""
+    scalar, ex, ey, ez = field
     return scalar * factor, ex * factor, ey * factor, ez * factor
 
 
 @part
-def bent(index, first, last, q1, q2, facing, dx, dy, dz, fx, fy, fz, nx, ny, nz):
+def bent(index, first, last, q1, q2, facing, d, f, n):
     """Direction, real index and fade of the wave beyond a boundary: what runs along it stays the same.
 
     `q1`, `q2` are the normal parts before and behind, in the sense of travel; `facing` the cosine.
     """
+    (dx, dy, dz), (fx, fy, fz), (nx, ny, nz) = d, f, n
     sense = 1.0 if facing > 0.0 else -1.0
     deeper = sense * (q2 - q1)
     x, y, z = index * dx + deeper.real * nx, index * dy + deeper.real * ny, index * dz + deeper.real * nz
@@ -92,19 +95,20 @@ def bent(index, first, last, q1, q2, facing, dx, dy, dz, fx, fy, fz, nx, ny, nz)
     scale = 1.0 / size if size > 0.0 else 0.0  # no light runs there
     # a wave that does not fade is as long as the index says
     plain = last.imag == 0.0 and fx == 0.0 and fy == 0.0 and fz == 0.0
-    return x * scale, y * scale, z * scale, (last.real if plain else size), fx, fy, fz
+    return (x * scale, y * scale, z * scale), (last.real if plain else size), (fx, fy, fz)
 
 
 @part
-def parted(scalar, e, d, h, t, n, rs, rp, ts, tp, polarised):
-    """The field that goes back along h, and that which goes on along t: a scalar and a vector each."""
-    (ex, ey, ez), (dx, dy, dz), (nx, ny, nz) = e, d, n
+def parted(field, d, h, t, n, rs, rp, ts, tp, polarised):
+    """The field that goes back along h, and that which goes on along t."""
+    scalar, ex, ey, ez = field
     if not polarised:
-        return scalar * rs, e, scalar * ts, e
-    sx, sy, sz = sideways(dx, dy, dz, nx, ny, nz)
-    s, p = split(ex, ey, ez, dx, dy, dz, sx, sy, sz)
-    back = made(rs * s, rp * p, h[0], h[1], h[2], sx, sy, sz)
-    return 0j, back, 0j, made(ts * s, tp * p, t[0], t[1], t[2], sx, sy, sz)
+        return (scalar * rs, ex, ey, ez), (scalar * ts, ex, ey, ez)
+    sx, sy, sz = sideways(d[0], d[1], d[2], n[0], n[1], n[2])
+    s, p = split(ex, ey, ez, d[0], d[1], d[2], sx, sy, sz)
+    hx, hy, hz = made(rs * s, rp * p, h[0], h[1], h[2], sx, sy, sz)
+    tx, ty, tz = made(ts * s, tp * p, t[0], t[1], t[2], sx, sy, sz)
+    return (0j, hx, hy, hz), (0j, tx, ty, tz)
 
 
 @part
@@ -117,22 +121,22 @@ def field_of(light, amplitude, row, polarised):
 
 
 @part
-def carry(light, amplitude, row, scalar, ex, ey, ez, polarised):
+def carry(light, amplitude, row, carried, polarised):
     """Write the field of a row; where it is a vector, the amplitude is its size."""
     field = light[4]
-    amplitude[row] = scalar
+    amplitude[row], ex, ey, ez = carried
     if polarised:
         field[row, 0], field[row, 1], field[row, 2] = ex, ey, ez
         amplitude[row] = np.sqrt(square(ex) + square(ey) + square(ez))
 
 
 @part
-def immerse(light, row, number, index, fx, fy, fz, fading):
+def immerse(light, row, number, index, fades, fading):
     """Write which medium a row is in, its real index there, how it fades."""
     medium, indices, fade = light[0], light[1], light[2]
     medium[row], indices[row] = number, index
     if fading:
-        fade[row, 0], fade[row, 1], fade[row, 2] = fx, fy, fz
+        fade[row, 0], fade[row, 1], fade[row, 2] = fades
 
 
 @part
@@ -198,10 +202,9 @@ def arrive(count, batch, light, met, triangle, limits, k0, ends, end_light, ende
         fx, fy, fz = fading_of(light, row, fading)
         fade = fx * dx + fy * dy + fz * dz
         if fade > 0.0:  # below by rounding alone: waves in passive media do not grow along the ray
-            scalar, ex, ey, ez = field_of(light, amplitude, row, polarised)
-            factor = np.exp(-k0 * fade * step)
-            gone += power(scalar, ex, ey, ez, polarised) * (1.0 - factor * factor)
-            carry(light, amplitude, row, scalar * factor, ex * factor, ey * factor, ez * factor, polarised)
+            field, factor = field_of(light, amplitude, row, polarised), np.exp(-k0 * fade * step)
+            gone += power(field, polarised) * (1.0 - factor * factor)
+            carry(light, amplitude, row, damped(field, factor), polarised)
         if fate != ALIVE:
             x, y, z = x + reach * dx, y + reach * dy, z + reach * dz
             label(end_key, end_ray, end_bounces, ended, key[row], ray[row], steps)
@@ -235,9 +238,9 @@ def duplicate(batch, light, row, to, number, polarised, fading):
 
 
 @part
-def turn(state, row, dx, dy, dz):
+def turn(state, row, d):
     """Write a new direction."""
-    state[row, DX], state[row, DY], state[row, DZ] = dx, dy, dz
+    state[row, DX], state[row, DY], state[row, DZ] = d
 
 
 @part
@@ -251,6 +254,23 @@ def allowed(follow, returns, passes):
     if not follow & REFLECTED:
         dropped, returns = dropped + returns, 0.0
     return returns, passes, absorbed, dropped
+
+
+@part
+def facing_of(state, row):
+    """Direction of a row, normal of what it stands at, and the cosine between them."""
+    dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+    nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+    return (dx, dy, dz), (nx, ny, nz), nx * dx + ny * dy + nz * dz
+
+
+@part
+def sent(state, light, amplitude, row, d, medium, index, fade, field, brightness, faint, polarised, fading):
+    """Write how a branch goes on, and in what; whether it is bright enough to be followed."""
+    turn(state, row, d)
+    immerse(light, row, medium, index, fade, fading)
+    carry(light, amplitude, row, field, polarised)
+    return FAINT if brightness < faint else ALIVE
 
 
 @jit
@@ -271,20 +291,16 @@ def meet(
     born = 0
     for row in range(count):
         surface = owner[np.uintp(last[row])]
-        _, _, _, dx, dy, dz, _ = under_way(state, row)
-        nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
-        facing = nx * dx + ny * dy + nz * dz
+        d, n, facing = facing_of(state, row)
         front, here, index = facing < 0.0, light[0][row], light[1][row]
-        fx, fy, fz = fading_of(light, row, fading)
-        scalar, ex, ey, ez = field_of(light, amplitude, row, polarised)
-        fade = fx * nx + fy * ny + fz * nz
+        f, field = fading_of(light, row, fading), field_of(light, amplitude, row, polarised)
+        fade = f[0] * n[0] + f[1] * n[1] + f[2] * n[2]
         beyond, q1 = here, complex(index * abs(facing), -fade if front else fade)
         rs, ts, q2 = reflection[surface], transmission[surface], q1
         rp, tp = -rs, ts
         if kind[surface] == BOUNDARY:
             mine, beyond = before[surface], behind[surface]
-            if not front:
-                mine, beyond = beyond, mine
+            mine, beyond = (mine, beyond) if front else (beyond, mine)
             contradictions[surface] += here != mine
             light[6][row] = max(light[6][row], 1.0 - facing * facing)
             inner, outer = media[here], media[beyond]
@@ -292,19 +308,13 @@ def meet(
                 rs, rp, ts, tp, q2 = coated(film, surface, front, inner, outer, q1, k0)
             else:
                 rs, rp, ts, tp, q2 = bare(inner, outer, q1)
-        tx, ty, tz, beside, ux, uy, uz = dx, dy, dz, index, fx, fy, fz
+        t, beside, u = d, index, f
         if q1 != q2:
-            tx, ty, tz, beside, ux, uy, uz = bent(
-                index, media[here], media[beyond], q1, q2, facing, dx, dy, dz, fx, fy, fz, nx, ny, nz
-            )
-        hx, hy, hz = bounced(dx, dy, dz, nx, ny, nz, facing, bounces[row])
-        carries = power(scalar, ex, ey, ez, polarised)
-        back, (ex, ey, ez), through, (gx, gy, gz) = parted(
-            scalar, (ex, ey, ez), (dx, dy, dz), (hx, hy, hz), (tx, ty, tz), (nx, ny, nz), rs, rp, ts, tp,
-            polarised,
-        )  # fmt: skip
-        passes, returns = power(through, gx, gy, gz, polarised), power(back, ex, ey, ez, polarised)
-        gone = carries - passes - returns
+            t, beside, u = bent(index, media[here], media[beyond], q1, q2, facing, d, f, n)
+        h = bounced(d[0], d[1], d[2], n[0], n[1], n[2], facing, bounces[row])
+        back, through = parted(field, d, h, t, n, rs, rp, ts, tp, polarised)
+        passes, returns = power(through, polarised), power(back, polarised)
+        gone = power(field, polarised) - passes - returns
         returns, passes, absorbed, dropped = allowed(follow[surface], returns, passes)
         lost[row], light[5][row] = lost[row] + gone + absorbed, light[5][row] + dropped
         reflections[row] += kind[surface] == CONSTANT and returns > 0.0 and passes == 0.0
@@ -314,20 +324,18 @@ def meet(
             if passes > 0.0:
                 to, parent[born], born = count + born, row, born + 1
                 duplicate(batch, light, row, to, first + born - 1, polarised, fading)
-            turn(state, row, hx, hy, hz)
-            fx, fy, fz = fx - 2.0 * fade * nx, fy - 2.0 * fade * ny, fz - 2.0 * fade * nz
-            immerse(light, row, here, index, fx, fy, fz, fading)
-            carry(light, amplitude, row, back, ex, ey, ez, polarised)
-            why[row] = FAINT if returns < faint else ALIVE
+            f = f[0] - 2.0 * fade * n[0], f[1] - 2.0 * fade * n[1], f[2] - 2.0 * fade * n[2]
+            why[row] = sent(
+                state, light, amplitude, row, h, here, index, f, back, returns, faint, polarised, fading
+            )
         elif passes > 0.0:
             key[row] += np.uint64(1)
         if passes > 0.0:
-            turn(state, to, tx, ty, tz)
-            immerse(light, to, beyond, beside, ux, uy, uz, fading)
-            carry(light, amplitude, to, through, gx, gy, gz, polarised)
-            why[to] = FAINT if passes < faint else ALIVE
+            why[to] = sent(
+                state, light, amplitude, to, t, beyond, beside, u, through, passes, faint, polarised, fading
+            )
         elif returns == 0.0:
-            carry(light, amplitude, row, 0j, 0j, 0j, 0j, polarised)
+            carry(light, amplitude, row, (0j, 0j, 0j, 0j), polarised)
     return born
 
 

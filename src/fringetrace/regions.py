@@ -84,9 +84,11 @@ def _met(paths: Paths, row: int) -> list[tuple[Surface, FloatArray]]:
 def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
     """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
+    assert paths.starts is not None
     u, v, direction = frame(beam.direction, beam.up, "Beam")
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
-    legs = np.diff(paths.points[row, 1 : paths.bounces[row] + 1], axis=0)
+    count = paths.bounces[row]
+    legs = paths.points[row, 2 : count + 1] - paths.starts[row, 1:count]
     onward = np.concatenate([legs, paths.direction[row, None]])
     index = indices(paths.where(np.array([row])))[0]
     for k, (surface, normal) in enumerate(_met(paths, row)):

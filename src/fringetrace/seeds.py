@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from fringetrace.caustics import NODES, airy_width, continued, foot, frame, locate, onto, pair, wave
-from fringetrace.exact import jit
+from fringetrace.exact import grown, jit
 from fringetrace.raster import widen
 
 # Airy widths from a fold: how far into the dark (where Ai is 1e-6), and how far to the lit side. There the
@@ -65,10 +65,11 @@ def seeds(cells, index, turns, place, crossed, wavenumber):
                     )  # fmt: skip
                     _, one_x, one_y, _, _, _ = wave(cells, index, p1, q1)
                     _, two_x, two_y, _, _, _ = wave(cells, index, p2, q2)
-                    found[count] = np.array([
-                        p, q, x, y, normal_x, normal_y, width, STRETCH * stretch, scale,
-                        0.5 * (one_x + two_x), 0.5 * (one_y + two_y),
-                    ])  # fmt: skip
+                    seed = found[count]
+                    seed[P], seed[Q], seed[X], seed[Y] = p, q, x, y
+                    seed[NORMAL_X], seed[NORMAL_Y] = normal_x, normal_y
+                    seed[WIDTH], seed[REACH], seed[SCALE] = width, STRETCH * stretch, scale
+                    seed[SLOPE_X], seed[SLOPE_Y] = 0.5 * (one_x + two_x), 0.5 * (one_y + two_y)
                     count += 1
                     break
     return found[:count]
@@ -137,9 +138,7 @@ def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x
                     if known(found, latest[k], p, q, SAME):
                         continue
                     if count == len(found):
-                        larger = np.empty((2 * count, 18))
-                        larger[:count] = found
-                        found = larger
+                        found = grown(found)
                     found[count, SAMPLE], found[count, BEFORE] = k, latest[k]
                     if branches(seed, cells, index, lines, turns, wavenumber, p, q, x[k], y[k], found[count]):
                         latest[k] = count
@@ -184,8 +183,10 @@ def branches(seed, cells, index, lines, turns, wavenumber, p, q, x, y, row):
     # not another fold's, nor out of the polynomial's depth
     if not there or z > LIT or not 0.3 < z / even < 3.0:
         return False
-    row[Z : TURNS + 1] = np.array([z, way, a.real, a.imag, b.real, b.imag, float(passed)])
-    row[FOOT_P : NEAR + 1] = np.array([p, q, p1, q1, p2, q2, near])
+    row[Z], row[WAY], row[TURNS] = z, way, passed
+    row[RE_A], row[IM_A], row[RE_B], row[IM_B] = a.real, a.imag, b.real, b.imag
+    row[FOOT_P], row[FOOT_Q], row[NEAR] = p, q, near
+    row[P1], row[Q1], row[P2], row[Q2] = p1, q1, p2, q2
     row[OWNS], row[PART] = (1.0, 1.0) if z < CLEAR else (0.0, (LIT - z) / (LIT - CLEAR))
     return True
 

@@ -19,11 +19,10 @@ VALUES: dict[str, Any] = {
     "aperture": "8 mm", "gap": "0.1 mm", "index": 1.34, "pixels": [128, 128], "rays": 0.5,
     "reference_tilt": ["200 urad", 0.0],
 }  # fmt: skip
-# The same where a bench needs another one.
-OWN: dict[str, dict[str, Any]] = {}
 BEGINNINGS: dict[str, Any] = {"m": "1 mm", "rad": "1 deg", "": 1.0}
-# What light is sent back by, and what it goes through.
+# What light is sent back by, once or to and fro, and what it goes through.
 STEP = {"type": '"step"', "width": '"10 mm"', "height": '"10 mm"', "edge": '"1 mm"', "rise": '"100 nm"'}
+FLAT = {"type": '"plate"', "width": '"10 mm"', "height": '"10 mm"'}
 BOX = {"type": '"plate"', "width": '"4 mm"', "height": '"4 mm"', "thickness": '"2 um"'}
 # Instead of numbers.
 FILED = '# or of a file beside this one: { file = "part.stl", unit = "mm" }'
@@ -99,7 +98,6 @@ def _bench(name: str, kind: Kind) -> str:
     """All parameters of a bench with what is said of them; those with a default as comments."""
     known = parameters(kind)
     first = " ".join((inspect.getdoc(kind) or name).partition("\n\n")[0].split())
-    meant = {**VALUES, **OWN.get(name, {})}
     height = "reference_tilt" in known and not _through(known)
     outputs = ["interferogram.png", "interferogram.nc", *(["height.png"] if height else [])]
     lines = [
@@ -110,9 +108,9 @@ def _bench(name: str, kind: Kind) -> str:
     for parameter in known.values():
         if Mesh in members(parameter.hint):
             end = lines if _through(known) else tables
-            end += ["", *_comment(parameter.text), *_sample(parameter, _through(known))]
+            end += ["", *_comment(parameter.text), *_sample(parameter, known)]
         else:
-            lines += ["", *_comment(parameter.text), _value(parameter, meant)]
+            lines += ["", *_comment(parameter.text), _value(parameter)]
     return "\n".join([*lines, *tables]) + "\n"
 
 
@@ -129,10 +127,10 @@ def _line(key: str, value: Any) -> str:
     return dump({key: value}).rstrip()
 
 
-def _value(parameter: Parameter, meant: dict[str, Any]) -> str:
+def _value(parameter: Parameter) -> str:
     """A line with a value; behind a # if it is the default."""
-    if parameter.name in meant:
-        return _line(parameter.name, meant[parameter.name])
+    if parameter.name in VALUES:
+        return _line(parameter.name, VALUES[parameter.name])
     if parameter.required:
         return _line(parameter.name, BEGINNINGS[parameter.unit])
     if parameter.default is None:
@@ -143,9 +141,11 @@ def _value(parameter: Parameter, meant: dict[str, Any]) -> str:
     return f"# {_line(parameter.name, value)}"
 
 
-def _sample(parameter: Parameter, through: bool) -> list[str]:
-    """The table of a sample: a step to reflect off, or a thin box to look through."""
-    mesh = ", ".join(f"{key} = {value}" for key, value in (BOX if through else STEP).items())
+def _sample(parameter: Parameter, known: dict[str, Parameter]) -> list[str]:
+    """The table of a sample: a step to reflect off, a flat for a cavity, or a thin box to look through."""
+    through = _through(known)
+    shape = BOX if through else FLAT if "gap" in known else STEP
+    mesh = ", ".join(f"{key} = {value}" for key, value in shape.items())
     if through:  # the bench knows what it is made of
         return [FILED, f"{parameter.name} = {{ {mesh} }}"]
     return [f"[bench.{parameter.name}]", FILED, f"mesh = {{ {mesh} }}", 'interface = "Mirror"']

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.exact import jit, part
+from fringetrace.exact import grown, jit, part
 
 
 @jit
@@ -68,9 +68,7 @@ def crossed(segments, rows, columns):
             right = min(max(np.floor(max(x0, x1) + slack), -1.0), columns - 1.0)
             for column in range(int(left), int(right) + 1):
                 if count == len(pairs):
-                    larger = np.empty((2 * count, 2), np.int64)
-                    larger[:count] = pairs
-                    pairs = larger
+                    pairs = grown(pairs)
                 pairs[count, 0], pairs[count, 1] = row * columns + column, segment
                 count += 1
     return pairs[:count]
@@ -126,7 +124,8 @@ def shatter(x, y, size, lines, segments, polygons, corners):
                 continue
             corners[count] = clip(polygons[q], corners[q], a, b, c, 1.0, polygons[count])
             corners[q] = clip(polygons[q], corners[q], a, b, c, -1.0, spare)
-            polygons[q, : corners[q]] = spare[: corners[q]]
+            for i in range(corners[q]):
+                polygons[q, i, 0], polygons[q, i, 1] = spare[i, 0], spare[i, 1]
             count += 1
     return count
 
@@ -157,9 +156,7 @@ def cut(pixels, parts, begin, lines, segments, columns, rule):
                     double = (p[i, 0] - p[0, 0]) * (p[i + 1, 1] - p[0, 1])
                     double -= (p[i, 1] - p[0, 1]) * (p[i + 1, 0] - p[0, 0])
                     if total + len(rule) > len(points):
-                        larger = np.empty((2 * len(points), 5))
-                        larger[:total] = points[:total]
-                        points = larger
+                        points = grown(points)
                     for k in range(len(rule)):
                         for axis in range(2):
                             points[total, axis] = (

@@ -32,10 +32,10 @@ def seen(surfaces, count, pixels, width=6 * mm):
 
 def bright(x, y):
     """Irradiance of the converging wave: r = 2 F tan(t / 2) leaves at an angle t to the axis."""
-    rho, depth = np.hypot(x, y), F - CCD_AT
-    angle = np.arctan2(rho, depth)
-    grow = F / np.cos(angle / 2) ** 2 * depth / (rho**2 + depth**2)
-    return 2 * F * np.tan(angle / 2) / rho * grow
+    depth = F - CCD_AT
+    away = np.sqrt(x * x + y * y + depth * depth)
+    # F / cos^2(t / 2) is the distance of the mirror from the focus, and cos t = depth / away
+    return (2 * F / (away + depth)) ** 2 * depth / away
 
 
 def landing(points):

@@ -401,9 +401,9 @@ def test_no_ray_falls_through_waves(form):
 
 def test_results_with_forms_do_not_depend_on_threads_or_chunks():
     rng = np.random.default_rng(31)
-    rays = ft.Rays(rng.uniform(-0.3, 0.3, (3000, 3)), directions(rng, 3000))
+    rays = ft.Rays(rng.uniform(-0.3, 0.3, (1000, 3)), directions(rng, 1000))
     scene = ft.Scene([ball(1.0, 2, inside=True), ball(0.1, 1, name="core")])
-    one = ft.trace(scene, rays, threads=1, chunk=3000)
+    one = ft.trace(scene, rays, threads=1, chunk=1000)
     other = ft.trace(scene, rays, threads=3, chunk=71)
     assert (one.length == other.length).all()
     assert (one.origin == other.origin).all()

@@ -9,7 +9,7 @@ from fringetrace import Dielectric, Surface, instruments, nm, um
 from fringetrace.films import fresnel
 from fringetrace.materials import CALCITE_E, CALCITE_O, CHITIN
 from fringetrace.plates import PhasePlate
-from fringetrace.shapes import plate
+from fringetrace.shapes import extrude, plate
 
 SODIUM = 589.3 * nm
 NINE = 0.5e-9
@@ -96,3 +96,35 @@ def test_power_adds_up_and_both_beams_meet():
     assert paths.ledger().error < 1e-12
     assert instrument.mark is not None
     assert np.bincount(instrument.mark.count(paths.detected)).tolist() == [12, 12]
+
+
+def test_recorded_light_goes_straight_on_from_where_the_plates_displace_it():
+    made = bench(delay(0.7), shear=50 * um)
+    paths = made.sampled((5, 5), SODIUM).detected
+    for row in range(len(paths)):
+        step = np.diff(paths.polyline(row), axis=0)
+        aside = np.abs(step[:, 2]) < 1e-9 * np.abs(step).max()
+        assert aside.sum() == 1  # by one of the plates
+        np.testing.assert_allclose(np.abs(step[aside]), [[50 * um, 0, 0]], rtol=1e-9, atol=1e-9 * um)
+        np.testing.assert_allclose(step[~aside, :2], 0.0, atol=1e-9 * um)
+        # the last step leads back to the plane of focus
+        assert paths.lengths[row].sum() == pytest.approx(step[~aside, 2].sum(), rel=1e-9)
+
+
+def test_the_budget_knows_where_light_goes_on():
+    """Roundings of some lengths of tens of micrometres."""
+    assert bench(delay(0.7)).budget(SODIUM).hit < PHASE
+
+
+@pytest.mark.parametrize("method", ["rays", "wavefront"])
+def test_light_that_a_sample_bends_is_in_focus(method):
+    """A roof bends the light of its flanks by up to 3.4 mrad apart; ends and ridge stand where they are."""
+    corners = np.array([(-20, -1), (20, -1), (20, 0), (0, 3), (-20, 0)]) * um
+    flake = Surface(extrude(corners, 30 * um, closed=True), Dielectric("transmitted"), "flake", back=1.56)
+    made = instruments.jamin_lebedeff(
+        flake, aperture=50 * um, medium=1.52, pixels=(1, 200), rays=2, method=method
+    )
+    light = made.mutual(SODIUM)[0, 0, 0].real
+    edges = np.flatnonzero(np.abs(np.diff(light)) > 0.1 * light.max()) - 99
+    assert set(edges.tolist()) <= {-81, -80, -1, 0, 1, 80, 81}  # pixels of 0.25 um
+    assert {-80, 80} <= {round(edge / 10) * 10 for edge in edges.tolist()}

@@ -1,4 +1,10 @@
-"""The round caustic of a spherical mirror behind a straight edge: folds, edges, fringes, of 10,000 rays."""
+"""
+The caustic of a spherical mirror
+=================================
+
+A round caustic behind a straight edge: folds, edges and fringes, all of 10,000 rays. Along the fold two waves
+merge, and their field is Airy's function; beyond it there is none.
+"""
 
 import numpy as np
 
@@ -20,4 +26,4 @@ image = ft.irradiance(paths, 632.8 * nm)
 print(f"{len(paths):,} paths; brightest pixel {image.max():,.0f} times the incident irradiance")
 print(f"on the caustic {image[200, 340:360].max():.0f}, 10 um outside {image[200, 390]:.1e}")
 shown = np.minimum(image, np.percentile(image, 99.5))  # the axis is a caustic too, far brighter
-ft.views.save(ft.views.interferogram(shown, ccd.pitch, wavelength=632.8 * nm), "03_caustic.png")
+ft.views.save(ft.views.interferogram(shown, ccd.pitch, wavelength=632.8 * nm), "13_caustic.png")
