@@ -50,7 +50,7 @@ def main() -> None:
     table = precision.table(done)
     print(table)
     if "--write" in sys.argv[1:]:
-        views.save(views.work_precision(precision.panels(done)), pages.ACCURACY.parent / PICTURE)
+        views.save(views.comparison(precision.panels(done)), pages.ACCURACY.parent / PICTURE)
         text = SECTION.format(cores=precision.machine()["cores"], table=table, picture=PICTURE)
         pages.write("precision", text)
 

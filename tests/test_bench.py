@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray
 
 import fringetrace as ft
-from fringetrace import instruments, mm, nm
+from fringetrace import instruments, mm, nm, tables
 from fringetrace.arms import path_slope
 from fringetrace.bench import Bench
 from fringetrace.quadrature import mutual_products
@@ -211,3 +212,30 @@ def test_arms_that_there_are_not_are_refused(bench):
     loose = Bench(bench.scene, bench.beam, bench.ccd, reference=bench.reference)
     with pytest.raises(ValueError, match=r"shut: expected an arm .*, got 'sample'"):
         loose.shut("sample")
+
+
+def test_everything_labelled(rays, tmp_path):
+    data = rays.dataset(HENE)
+    np.testing.assert_array_equal(data.interferogram, rays.interferogram(HENE))
+    np.testing.assert_array_equal(data.frames, rays.phase_steps(HENE))
+    np.testing.assert_array_equal(data.wrapped_phase, rays.wrapped(HENE))
+    np.testing.assert_array_equal(data.field_real + 1j * data.field_imag, rays.field(HENE))
+    assert data.frames.dims == ("step", "y", "x")
+    assert data.step.values == pytest.approx(np.arange(4) * math.pi / 2)
+    # the reference's path rises with x as it is told to: the fringes in metres
+    slope = path_slope(rays.tilt)[0]
+    turn = np.diff(np.unwrap(data.wrapped_phase.isel(y=3))) / np.diff(data.x)
+    np.testing.assert_allclose(turn, 2 * math.pi / HENE * slope, rtol=1e-6)
+    assert {name: data[name].attrs["units"] for name in ("x", "y", "step", "wrapped_phase")} == {
+        "x": "m", "y": "m", "step": "rad", "wrapped_phase": "rad"
+    }  # fmt: skip
+    assert data.attrs["wavelength_m"] == HENE
+    tables.write_netcdf(data, tmp_path / "bench.nc")
+    xarray.testing.assert_identical(xarray.load_dataset(tmp_path / "bench.nc", engine="h5netcdf"), data)
+
+
+def test_polarised_fields_have_components(rays):
+    beam = replace(rays.beam, polarisation=(1.0, 1.0j))
+    data = replace(rays, beam=beam).dataset(HENE)
+    assert data.field_real.dims == ("component", "y", "x")
+    assert data.field_imag.shape == (3, 6, 8)

@@ -160,6 +160,22 @@ def test_the_demo_comes_back_within_a_thousandth_of_a_wave(tmp_path):
         assert np.isfinite(data["residual"]).all()
 
 
+def test_the_height_as_files_of_zygo(command, sample, tmp_path):
+    out = tmp_path / "out"
+    given = ["interferogram", sample, "--unit", "mm", "--out", out, *QUICK, "--zygo"]
+    code, said, _ = command(*given, "dat", "datx")
+    assert code == 0
+    assert "height.dat, height.datx, height.png" in said
+    with xarray.open_dataset(out / "result.nc", engine="h5netcdf") as data:
+        height, pitch = data.height.values, data.attrs["pixel_pitch_m"]
+    for kind, error in (("dat", 632.8 * nm / 131072), ("datx", 1e-12 * nm)):
+        z, found = meshes.read_height_map(out / f"height.{kind}")
+        np.testing.assert_allclose(z, height, rtol=0, atol=error)
+        assert found == pytest.approx(pitch, rel=1e-7)
+    code, _, error = command(*given, "x3p")
+    assert (code, error) == (2, "fringetrace: --zygo: expected dat or datx, got 'x3p'\n")
+
+
 @pytest.mark.slow
 @pytest.mark.skipif("FRINGETRACE_DATA" not in os.environ, reason="needs the folder FRINGETRACE_DATA")
 def test_a_measured_surface_goes_through_like_any_mesh(command, tmp_path):

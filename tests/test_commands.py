@@ -7,7 +7,7 @@ import pytest
 import xarray
 
 import fringetrace as ft
-from fringetrace import cli, commands, sweeps
+from fringetrace import cli, commands, exhibits, meshes, mm, nm, shapes, sweeps
 from fringetrace.studies import Lattice
 
 SHORT = ["--angles", "20 deg", "2", "--wavelengths", "400 nm", "600 nm", "5"]
@@ -36,6 +36,30 @@ def test_a_mesh_to_its_brdf(rods, tmp_path, capsys, extra):
         with (out / "brdf.csv").open() as file:
             assert [float(row["brdf"]) for row in csv.DictReader(file)] == table.values.ravel().tolist()
     assert (out / "spectra.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.fixture
+def feathers(tmp_path):
+    (tmp_path / "feathers.csv").write_text("wavelength / nm,blue\n400,0.4\n500,0.2\n600,0.1\n")
+    return tmp_path / "feathers.csv"
+
+
+def test_measured_spectra_are_laid_over(rods, feathers, tmp_path, capsys):
+    out = tmp_path / "out"
+    given = ["--unit", "um", "--out", str(out), *SHORT, "--rays", "1", "200", "--measured", str(feathers)]
+    assert cli.main(["brdf", str(rods), *given]) == 0
+    assert "spectra.png, measured.png" in capsys.readouterr().out
+    assert {file.name for file in out.iterdir()} == {*commands.FILES, "measured.png"}
+    feathers.write_text("blue\n1\n")
+    assert cli.main(["brdf", str(rods), *given]) == cli.FAILURE
+    assert "expected a column of wavelengths" in capsys.readouterr().err
+
+
+def test_measured_spectra_beside_layers(feathers, tmp_path, capsys):
+    given = ["--rod", "1.6", "--host", "1.5", "--method", "multilayer", "--measured", str(feathers), *SHORT]
+    assert cli.main(["lattice", "--rows", "2", "--out", str(tmp_path / "out"), *given]) == 0
+    assert "reflectance.csv, measured.png" in capsys.readouterr().out
+    assert (tmp_path / "out" / "measured.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_lattices_in_one_call(tmp_path, capsys, monkeypatch):
@@ -95,6 +119,42 @@ def test_a_file_begun_is_a_file_that_runs(tmp_path, monkeypatch, capsys):
     assert "\nbudget       of the image: hit " in said.out
     assert "\nwritten      fringetrace-my: field.nc, interferogram.png" in said.out
     assert (tmp_path / "fringetrace-my" / "paths.nc").is_file()
+
+
+def test_a_scene_file_and_a_mesh_are_looked_at(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["init", "free"]) == 0
+    text = capsys.readouterr().out.replace("[128, 128]", "[16, 16]").replace("[64, 64]", "[8, 8]")
+    (tmp_path / "my.toml").write_text(text)
+    arguments = [
+        "view",
+        "my.toml",
+        "--html",
+        "it.html",
+        "--export",
+        "it.vtp",
+        "--colour",
+        "phase",
+        "--rays",
+        "4",
+    ]
+    assert cli.main(arguments) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert said.out.startswith("scene        2 surfaces, ")
+    assert "path ends of 1 beams\nwritten      it.html, it.vtp\n" in said.out
+    assert "16 rays" in (tmp_path / "it.html").read_text("utf-8")
+    meshes.save(shapes.plate(1 * mm, 1 * mm), tmp_path / "part.stl", unit="mm")
+    assert cli.main(["view", "part.stl", "--unit", "mm", "--export", "part.glb"]) == 0
+    assert capsys.readouterr().out == "scene        1 surfaces, no rays\nwritten      part.glb\n"
+    shown = []
+    monkeypatch.setattr(exhibits, "show", lambda scene, paths, **looks: shown.append((scene, looks)))
+    assert cli.main(["view", "my.toml", "--wavelength", "500 nm"]) == 0
+    assert shown[0][1]["wavelength"] == pytest.approx(500 * nm)
+    assert shown[0][1]["image"].shape == (16, 16)
+    assert capsys.readouterr().out == ""
+    assert cli.main(["view", "my.toml", "--rays", "0"]) == cli.FAILURE
+    assert "--rays: expected at least 1, got 0" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

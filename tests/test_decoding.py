@@ -197,7 +197,7 @@ ERRORS = {
     "no mesh": (
         'x = { file = "notes.txt", unit = "mm" }',
         Mesh,
-        "1: x.file: expected a file named .dat, .glb, .npz,",
+        "1: x.file: expected a file named .dat, .datx, .glb, .npz,",
     ),
     "parts elsewhere": (
         'x = { file = "odd.glb", unit = "mm" }',

@@ -9,8 +9,8 @@ import pytest
 from matplotlib.image import imread
 
 import fringetrace as ft
-from fringetrace import drawing, instruments, mm, nm, um, views
-from fringetrace.shapes import height_map, plate
+from fringetrace import drawing, exhibits, instruments, mm, nm, offscreen, um, views, waves
+from fringetrace.shapes import height_map, icosphere, plate
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="takes the loader of Linux")
 
@@ -45,47 +45,10 @@ def paths(bench):
     ],
 )
 def test_units_leave_a_few_digits_before_the_point(length, unit):
-    name, metres = drawing.unit_of(length)
+    name, metres = waves.unit_of(length)
     assert name == unit
-    assert drawing.unit_of(-length) == (name, metres)
+    assert waves.unit_of(-length) == (name, metres)
     assert metres == {"m": 1, "mm": mm, "µm": um, "nm": nm, "pm": 1e-12}[unit]
-
-
-def test_the_two_arms_are_two_routes_of_different_rays(bench, paths):
-    sketch = drawing._drawing(bench.scene, paths, "route", "sample")
-    assert [name for name, _ in sketch["routes"]] == [
-        "splitter, sample, splitter",
-        "splitter, reference, splitter",
-    ]
-    starts = [{tuple(line[0]) for line in lines} for _, lines in sketch["routes"]]
-    assert [len(start) for start in starts] == [8, 8]
-    assert not starts[0] & starts[1]
-
-
-def test_lines_end_on_the_chip_and_not_in_its_plane_of_focus(bench, paths):
-    assert bench.ccd.focus != 0.0
-    for _, lines in drawing._drawing(bench.scene, paths, "route", None)["routes"]:
-        for line in lines:
-            np.testing.assert_allclose(line[-1][2], bench.ccd.centre[2], rtol=1e-12)
-            np.testing.assert_allclose(line[0][0], bench.beam.centre[0], rtol=1e-12)
-
-
-def test_light_that_leaves_is_drawn_a_bit_on():
-    scene = ft.Scene([ft.Surface(plate(1 * mm, 1 * mm), ft.Mirror(), "floor")])
-    rays = ft.Rays([[0, 0, 1 * mm], [5 * mm, 0, 1 * mm]], [[0, 0, -1.0], [0, 0, -1.0]])
-    sketch = drawing._drawing(scene, ft.trace(scene, rays, record=True), "route", None)
-    routes = dict(sketch["routes"])
-    assert set(routes) == {"floor", "straight"}
-    assert routes["floor"][0][:, 2] == pytest.approx([1 * mm, 0, 0.3 * mm])
-    assert routes["straight"][0][:, 2] == pytest.approx([1 * mm, 0.7 * mm])
-    assert "source" not in sketch
-    assert "CCD" not in sketch
-
-
-def test_more_routes_than_colours_share_the_last(monkeypatch, bench, paths):
-    monkeypatch.setattr(drawing, "COLOURS", ("#000000", "#777777"))
-    names = [name for name, _ in drawing._drawing(bench.scene, paths, "route", None)["routes"]]
-    assert names == ["splitter, sample, splitter", "other paths"]
 
 
 def test_a_picture_needs_recorded_paths(bench, tmp_path):
@@ -94,7 +57,7 @@ def test_a_picture_needs_recorded_paths(bench, tmp_path):
 
 
 def test_an_unknown_way_of_colouring_is_refused(bench, paths, tmp_path):
-    with pytest.raises(ValueError, match="colour: expected 'route' or 'length', got 'red'"):
+    with pytest.raises(ValueError, match=r"colour: expected 'route', .* or 'power', got 'red'"):
         views.picture(bench.scene, paths, tmp_path / "scene.png", colour="red")
     with pytest.raises(ValueError, match="expected one surface called 'lens'"):
         views.picture(bench.scene, paths, tmp_path / "scene.png", relief="lens")
@@ -128,20 +91,20 @@ def test_a_scene_without_rays_can_be_drawn(missing, bench, tmp_path):
 
 def test_a_crash_names_the_packages_to_install():
     with pytest.raises(RuntimeError, match="apt-get install libegl1 libgl1-mesa-dri"):
-        drawing._child("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+        offscreen.child("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
 
 
 def test_any_other_failure_is_passed_on():
     with pytest.raises(RuntimeError, match="3D picture: ZeroDivisionError: division by zero"):
-        drawing._child("1 / 0")
+        offscreen.child("1 / 0")
     with pytest.raises(RuntimeError, match="3D picture: failed"):
-        drawing._child("raise SystemExit(3)")
+        offscreen.child("raise SystemExit(3)")
 
 
 def test_a_picture_that_hangs_is_given_up(monkeypatch):
-    monkeypatch.setattr(drawing, "SECONDS", 0.5)
+    monkeypatch.setattr(offscreen, "SECONDS", 0.5)
     with pytest.raises(RuntimeError, match=r"gave up after 0\.5 s"):
-        drawing._child("import time; time.sleep(60)")
+        offscreen.child("import time; time.sleep(60)")
 
 
 @pytest.fixture
@@ -162,3 +125,100 @@ def test_without_opengl_it_says_what_to_install(without_opengl, bench, paths, tm
     with pytest.raises(RuntimeError, match="apt-get install libegl1 libgl1-mesa-dri"):
         views.show(bench.scene, paths)
     assert not list(tmp_path.iterdir())
+
+
+class Seen:
+    """What a view looks like: its picture, and where points of the scene are in it."""
+
+    def __init__(self, view, size=(800, 600)):
+        self.plotter = drawing.empty(size)
+        drawing.draw(self.plotter, view)
+        self.metres = view.stage.metres
+        self.image = np.asarray(self.plotter.screenshot(return_img=True))[..., :3].astype(int)
+
+    def place(self, point):
+        """Row and column of a point of the scene."""
+        renderer = self.plotter.renderer
+        renderer.SetWorldPoint(*np.asarray(point) / self.metres, 1.0)
+        renderer.WorldToDisplay()
+        x, y, _ = renderer.GetDisplayPoint()
+        return self.image.shape[0] - 1 - round(y), round(x)
+
+    def at(self, point):
+        """Colour at a point of the scene."""
+        return self.image[self.place(point)]
+
+    def near(self, point, colour, pixels=3):
+        """Whether a colour is there, within some pixels: lines are thin."""
+        row, column = self.place(point)
+        part = self.image[row - pixels : row + pixels + 1, column - pixels : column + pixels + 1]
+        wanted = [int(colour[at : at + 2], 16) for at in (1, 3, 5)]
+        return bool((np.abs(part - wanted).sum(axis=2) < 150).any())
+
+
+@pytest.fixture(scope="module")
+def camera():
+    """A mirror below a CCD that looks down at it, and rays straight down and up again."""
+    mirror = ft.Surface(plate(4 * mm, 4 * mm), ft.Mirror(), "mirror")
+    glass = ft.Surface(icosphere(0.5 * mm, 2).moved([6 * mm, 0, 2 * mm]), ft.Dielectric(), "ball", back=1.5)
+    ccd = ft.CCD([0, 6 * mm, 6 * mm], [0, -1, 0], [0, 0, 1], 1 * mm, (4, 4))
+    rays = ft.Rays([[-1 * mm, -1 * mm, 6 * mm], [1 * mm, -1 * mm, 6 * mm]], [[0, 0, -1.0], [0, 0, -1.0]])
+    scene = ft.Scene([mirror, glass])
+    return scene, ft.trace(scene, rays, ccd, wavelength=600 * nm, record=True)
+
+
+@pytest.mark.slow
+def test_the_ccd_shows_its_image_the_right_way_up(missing, camera):
+    if missing:
+        pytest.skip(missing)
+    image = np.zeros((4, 4))
+    image[0, :] = 0.5  # the lowest row,
+    image[3, 3] = 1.0  # and the corner at the end of u and v
+    scene, paths = camera
+    seen = Seen(exhibits.view(scene, paths, image=image))
+    u, v, _ = paths.ccd.axes
+    for row in range(4):
+        for column in range(4):
+            spot = paths.ccd.centre + (column - 1.5) * mm * u + (row - 1.5) * mm * v
+            assert abs(seen.at(spot) - 255 * image[row, column]).max() < 12, (row, column)
+
+
+@pytest.mark.slow
+def test_rays_have_their_colours_where_they_are(missing, camera):
+    if missing:
+        pytest.skip(missing)
+    scene, paths = camera
+    middle, moved = np.array([1 * mm, -1 * mm, 1 * mm]), np.array([-3 * mm, -1 * mm, 1 * mm])
+    whole = Seen(exhibits.view(scene, paths, colour="fate"))
+    assert whole.near(middle, "#E69F00")
+    apart = Seen(exhibits.view(scene, paths, colour="bounce", explode=(-4 * mm, 0, 0)))
+    assert apart.near(middle, "#440154")
+    assert apart.near(moved, "#FDE725")
+    first = Seen(exhibits.view(scene, paths, colour="bounce", explode=(-4 * mm, 0, 0), upto=0))
+    assert first.near(middle, "#440154")
+    assert not first.near(moved, "#FDE725")
+
+
+@pytest.mark.slow
+def test_glass_is_seen_through_and_a_plane_cuts(missing, camera):
+    if missing:
+        pytest.skip(missing)
+    scene, _ = camera
+    ball, floor = np.array([6 * mm, 0, 2 * mm]), np.array([-1.5 * mm, 0.5 * mm, 0])
+    whole = Seen(exhibits.view(scene, None))
+    assert 60 < whole.at(ball).min() < 245  # white behind green of low opacity
+    assert whole.at(floor).max() < 230
+    cut = Seen(exhibits.view(scene, None, clip=((1, 0, 0), (3 * mm, 0, 0))))
+    assert cut.at(ball).min() > 200
+    assert (cut.at(floor) == whole.at(floor)).all()
+
+
+def test_a_window_needs_a_display(missing, bench, paths, monkeypatch):
+    if missing:
+        pytest.skip(missing)
+    monkeypatch.setattr(offscreen, "opengl", lambda: None)
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(RuntimeError, match="a window needs a display"):
+        views.show(bench.scene, paths)

@@ -291,6 +291,4 @@ def test_a_bench_that_depends_on_the_wavelength_is_traced_once_for_each():
 
 def test_an_arm_of_two_apertures_is_long_enough_in_any_unit():
     for unit in (ft.nm, ft.um, ft.mm, 1e-5):
-        ft.instruments.michelson(
-            shapes.plate(3 * unit, 3 * unit), aperture=2 * unit, arm=4 * unit, pixels=(2, 2)
-        )
+        michelson(sample=plate(3 * unit, 3 * unit), aperture=2 * unit, arm=4 * unit)

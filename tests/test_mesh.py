@@ -6,10 +6,14 @@ import pickle
 
 import numpy as np
 import pytest
+import pyvista
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fringetrace as ft
+from fringetrace import instruments, measurement, meshes, shapes
+from fringetrace.mesh import as_mesh
 from fringetrace.vectors import rotation
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
@@ -195,3 +199,75 @@ def test_moved_refuses_what_is_no_motion():
         square().moved(turn=np.eye(2))
     with pytest.raises(ValueError, match="turn: expected a rotation matrix, got"):
         square().moved(turn=np.diag([1.0, 1.0, -1.0]))
+
+
+# From other libraries
+
+
+def test_a_polydata_is_cut_into_triangles():
+    cube = pyvista.Cube(x_length=2.0).cast_to_unstructured_grid().extract_surface(algorithm=None)
+    assert cube.n_cells == 6
+    mesh = as_mesh(cube, "cube")
+    assert (len(mesh.faces), mesh.name) == (12, "cube")
+    assert mesh.bounds.tolist() == [[-1.0, -0.5, -0.5], [1.0, 0.5, 0.5]]
+    strip = pyvista.PolyData(CORNERS, strips=[4, 0, 1, 3, 2])
+    assert len(as_mesh(strip).faces) == 2
+    # normals stay outside: the volume is positive
+    first, second, third = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
+    assert (first * np.cross(second, third)).sum() / 6.0 == pytest.approx(2.0)
+
+
+def test_a_polydata_of_float64_keeps_its_digits():
+    corners = CORNERS / 3.0
+    mesh = as_mesh(pyvista.PolyData.from_regular_faces(corners, FACES))
+    assert mesh.vertices.tobytes() == corners.tobytes()
+    assert mesh.faces.tolist() == np.asarray(FACES).tolist()
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "message"),
+    [
+        (
+            pyvista.PolyData(CORNERS),
+            ValueError,
+            r"sample: .* of faces only, got 4 loose points",
+        ),
+        (pyvista.Line(), ValueError, r"sample: .* of faces only, got 1 lines"),
+        (
+            pyvista.PolyData(),
+            ValueError,
+            "sample faces: expected at least one",
+        ),
+        (pyvista.ImageData(), TypeError, r"sample: .* got ImageData; .* have a surface, extract_surface\(\)"),
+        (trimesh.Scene(), TypeError, r"sample: expected a mesh .* got Scene"),
+        ("part.stl", TypeError, "sample: .* got str; files are read by fringetrace.meshes.load"),
+    ],
+)
+def test_what_is_no_mesh_is_refused_by_name(value, error, message):
+    with pytest.raises(error, match=message):
+        as_mesh(value, "sample")
+
+
+def test_a_trimesh_that_knows_its_unit_must_be_in_metres():
+    box = trimesh.creation.box()
+    for unit in (None, "m", "meters"):
+        box.units = unit
+        assert len(as_mesh(box).faces) == 12
+    box.units = "mm"
+    with pytest.raises(ValueError, match=r"box: expected a mesh in metres, got one in mm; call .*'meters'"):
+        as_mesh(box, "box")
+
+
+def test_every_door_takes_the_meshes_of_others(tmp_path):
+    mesh = shapes.plate(8e-3, 8e-3, 1e-3)
+    for other in (meshes.to_trimesh(mesh), meshes.to_pyvista(mesh)):
+        assert len(ft.Surface(other, ft.Mirror()).mesh.faces) == 12
+        optics = {"aperture": 4e-3, "pixels": (4, 4)}
+        for bench in (
+            instruments.michelson(other, **optics), instruments.fizeau(other, gap=2e-3, **optics),
+            instruments.mach_zehnder(other, index=1.5, **optics),
+        ):  # fmt: skip
+            assert 12 in [len(surface.mesh.faces) for surface in bench.scene.surfaces]
+        meshes.save(other, tmp_path / "plate.npz", "m")
+        assert meshes.interpolate_height(other, 0.0, 0.0) == mesh.bounds[1, 2]
+        assert measurement.heights(other, (2, 2), 1e-3) == pytest.approx(mesh.bounds[1, 2])

@@ -1,7 +1,6 @@
 import os
 import pickle
 import runpy
-import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from fringetrace import Mesh, meshes, mm, nm, shapes, um
+from fringetrace.mesh import as_mesh
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = ROOT / "meshes"
@@ -225,103 +225,6 @@ def test_nothing_half_written(tmp_path, monkeypatch):
     assert len(list(tmp_path.iterdir())) == 1
 
 
-# Measured height maps
-
-
-def metropro(counts, *, pitch=2.0**-20, sign=0, resolution=1):
-    """A MetroPro file of whole counts, laid out as in Zygo's reference guide; one count is 2**-37 m."""
-    rows, columns = counts.shape
-    header = bytearray(834)
-    struct.pack_into(">IHI", header, 0, 0x881B036F, 1, len(header))
-    struct.pack_into(">5HHI", header, 48, 0, 0, columns, rows, 1, 255, 2 * counts.size)
-    struct.pack_into(">4HI", header, 64, 0, 0, columns, rows, 4 * counts.size)
-    # interferometric scale factor, wavelength, numerical aperture, obliquity, magnification, pitch
-    struct.pack_into(">6f", header, 164, 0.5, 2.0**-21, 0.0, 1.0, 0.0, pitch)
-    struct.pack_into(">H", header, 218, resolution)
-    struct.pack_into(">H", header, 232, sign)
-    return bytes(header) + np.zeros(counts.shape, ">u2").tobytes() + counts.astype(">i4").tobytes()
-
-
-INVALID = 2147483640
-COUNTS = np.array([[100, 200, INVALID], [-400, 500, 600]])
-
-
-def test_a_metropro_file_is_read_in_metres_from_below(tmp_path):
-    file = tmp_path / "map.dat"
-    file.write_bytes(metropro(COUNTS))
-    z, pitch = meshes.read_height_map(file)
-    assert z.dtype == np.float64
-    assert pitch == 2.0**-20
-    # the file's first row is the top of the picture
-    assert z / 2.0**-37 == pytest.approx(np.array([[-400, 500, 600], [100, 200, np.nan]]), nan_ok=True)
-
-
-def test_a_metropro_file_may_count_downwards(tmp_path):
-    file = tmp_path / "map.dat"
-    file.write_bytes(metropro(COUNTS, sign=1, resolution=0))
-    z, _ = meshes.read_height_map(str(file))
-    assert z[0] / 2.0**-34 == pytest.approx([400, -500, -600])
-
-
-def test_a_metropro_file_is_a_mesh_with_holes(tmp_path):
-    file = tmp_path / "map.DAT"
-    file.write_bytes(metropro(COUNTS))
-    for mesh in (meshes.load(file), meshes.load(file, unit="mm")):  # it knows its own unit
-        assert len(mesh.faces) == 3
-        assert mesh.name == "map.DAT"
-        assert mesh.bounds[:, 0].tolist() == [-(2.0**-20), 2.0**-20]
-        assert mesh.bounds[:, 2] == pytest.approx([-400 * 2.0**-37, 600 * 2.0**-37])
-
-
-@pytest.mark.parametrize(
-    ("content", "message"),
-    [
-        (metropro(COUNTS)[:-1], "map.dat: expected a whole MetroPro file, got one that does not parse"),
-        (metropro(COUNTS)[:300], "map.dat: expected a whole MetroPro file"),
-        (metropro(COUNTS, resolution=7), "map.dat: expected a whole MetroPro file"),
-        (metropro(COUNTS, pitch=0.0), "map.dat: expected a calibrated map, got a lateral resolution of 0 m"),
-        (b"", "map.dat: expected a MetroPro file, got one that begins with b''"),
-        (b"1.0 2.0 3.0", "map.dat: expected a MetroPro file, got one that begins with b'1.0 '"),
-    ],
-)
-def test_metropro_files_that_are_wrong(tmp_path, content, message):
-    file = tmp_path / "map.dat"
-    file.write_bytes(content)
-    with pytest.raises(ValueError, match=message):
-        meshes.load(file)
-
-
-def test_other_files_are_no_height_maps(tmp_path):
-    file = tmp_path / "map.txt"
-    file.write_text("1 2 3")
-    with pytest.raises(ValueError, match=r"map.txt: expected a MetroPro height map named .dat, got '.txt'"):
-        meshes.read_height_map(file)
-
-
-def test_a_map_that_somebody_measured():
-    folder = os.environ.get("FRINGETRACE_DATA")
-    if not folder:
-        pytest.skip("FRINGETRACE_DATA names no folder of measured data")
-    file = Path(folder) / "metropro-1.dat"
-    z, pitch = meshes.read_height_map(file)
-    assert z.shape == (480, 640)
-    assert pitch == pytest.approx(1.098 * um, abs=0.0005 * um)
-    assert np.nanmax(z) - np.nanmin(z) == pytest.approx(1.363 * um, abs=0.0005 * um)
-    assert np.nanstd(z) == pytest.approx(75.3 * nm, abs=0.05 * nm)
-    # the numbers themselves, straight from the file: counts of half a wavelength over 32768, top row first
-    content = file.read_bytes()
-    scale, wavelength = struct.unpack_from(">2f", content, 164)
-    counts = np.frombuffer(content, ">i4", 480 * 640, len(content) - 4 * 480 * 640).reshape(480, 640)
-    expected = np.where(counts < INVALID, counts * (scale * wavelength / 32768), np.nan)[::-1]
-    assert np.allclose(z, expected, rtol=ROUNDING, atol=0, equal_nan=True)
-
-    mesh = meshes.load(file)
-    assert len(mesh.vertices) == np.isfinite(z).sum()
-    column, row = (np.arange(640) - 319.5) * pitch, (np.arange(480) - 239.5) * pitch
-    seen = meshes.interpolate_height(mesh, column[::5], row[::5, None])
-    assert np.array_equal(seen, z[::5, ::5], equal_nan=True)
-
-
 # The elevation sample
 
 
@@ -357,8 +260,9 @@ def test_matplotlib_without_its_samples(tmp_path, monkeypatch, spec):
 
 def test_heavy_libraries_are_imported_at_first_use():
     code = (
-        "import sys; from fringetrace import meshes, shapes; meshes.elevation_sample(1e-6, 1e-2);"
-        "shapes.icosphere(1.0, 1); print({'trimesh', 'prysm', 'matplotlib'} & set(sys.modules))"
+        "import sys, fringetrace as ft; ft.meshes.elevation_sample(1e-6, 1e-2);"
+        "ft.Surface(ft.shapes.icosphere(1.0, 1), ft.Mirror());"
+        "print({'trimesh', 'prysm', 'matplotlib', 'pyvista'} & set(sys.modules))"
     )
     out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert out.stdout.strip() == "set()"
@@ -489,3 +393,26 @@ def test_an_archive_of_something_else_is_refused(tmp_path, content):
     np.savez(tmp_path / "odd.npz", **content)
     with pytest.raises(ValueError, match=r"odd\.npz: expected an archive of vertices and faces, got"):
         meshes.load(tmp_path / "odd.npz", "m")
+
+
+# To other libraries
+
+
+def test_a_mesh_comes_back_from_other_libraries_as_it_was():
+    mesh = shapes.icosphere(1e-3 / 3.0, 2)
+    for other in (meshes.to_trimesh(mesh), meshes.to_pyvista(mesh)):
+        back = as_mesh(other)
+        assert back.vertices.tobytes() == mesh.vertices.tobytes()
+        assert back.faces.tobytes() == mesh.faces.tobytes()
+
+
+def test_what_is_given_is_a_copy_with_name_and_unit():
+    mesh = shapes.plate(2.0, 1.0, 0.5)
+    solid, data = meshes.to_trimesh(mesh), meshes.to_pyvista(mesh)
+    solid.vertices[:] = 0.0
+    data.points[:] = 0.0
+    assert mesh.bounds[1].tolist() == [1.0, 0.5, 0.0]
+    assert (solid.units, solid.metadata["name"]) == ("meters", mesh.name)
+    assert (data.field_data["unit"][0], data.field_data["name"][0]) == ("m", mesh.name)
+    assert meshes.to_pyvista(mesh).volume == pytest.approx(1.0)
+    assert meshes.to_trimesh(mesh).volume == pytest.approx(1.0)

@@ -18,7 +18,7 @@ MODULE = {"scikit-image": "skimage", "pyyaml": "yaml", "colour-science": "colour
 HEAVY = [
     "numba", "embreex", "trimesh", "prysm", "scipy", "skimage", "matplotlib", "pyvista", "vtk", "vtkmodules",
     "finufft", "distributed", "dask", "xarray", "h5netcdf", "h5py", "pandas", "tifffile", "cyclopts", "rich",
-    "PIL", "yaml", "colour", "tomlkit",
+    "PIL", "yaml", "colour", "tomlkit", "plotly",
 ]  # fmt: skip
 
 

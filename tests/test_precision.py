@@ -117,7 +117,7 @@ def test_all_runs_and_the_machine_are_written(tmp_path):
 
 
 def test_the_picture_has_a_pair_of_axes_for_each_scene():
-    figure = views.work_precision(precision.panels(some()))
+    figure = views.comparison(precision.panels(some()))
     axes = figure.axes
     assert len(axes) == 4
     assert [ax.get_xlabel() for ax in axes] == ["seconds", "rays"] * 2
@@ -132,8 +132,8 @@ def test_the_picture_has_a_pair_of_axes_for_each_scene():
 
 
 def test_a_picture_of_nothing_is_refused():
-    with pytest.raises(ValueError, match="work_precision: expected at least one panel, got none"):
-        views.work_precision({})
+    with pytest.raises(ValueError, match="comparison: expected at least one panel, got none"):
+        views.comparison({})
 
 
 def test_unknown_scenes_are_refused():

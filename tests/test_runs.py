@@ -86,7 +86,7 @@ def test_light_with_a_polarisation_has_components(tmp_path):
 def test_outputs_of_a_bench(tmp_path):
     text = """
     wavelengths = ["500 nm"]
-    outputs = ["frames.tif", "height.nc", "field.nc"]
+    outputs = ["frames.tif", "height.nc", "height.dat", "height.datx", "field.nc"]
     steps = 5
     [bench]
     type = "michelson"
@@ -101,6 +101,10 @@ def test_outputs_of_a_bench(tmp_path):
     bench = setup.bench.bench
     height = dataset(tmp_path / "out" / "height.nc")["height"][0]
     np.testing.assert_array_equal(height, bench.height(500 * nm, 5))
+    for kind in ("dat", "datx"):
+        z, pitch = ft.meshes.read_height_map(tmp_path / "out" / f"height.{kind}")
+        np.testing.assert_allclose(z, height, rtol=0, atol=500 * nm / 131072)  # half a count
+        assert pitch == pytest.approx(bench.ccd.pitch, rel=1e-7)
     field = dataset(tmp_path / "out" / "field.nc")["field_imag"][0]
     np.testing.assert_array_equal(field, bench.field(500 * nm).imag)
 

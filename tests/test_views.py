@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from fringetrace import mm, nm, tables, um, views
+from fringetrace import mm, nm, um, views
 
 IMAGE = np.arange(12.0).reshape(3, 4) / 11
 MAPS = (views.interferogram, views.height, views.residual, views.phase)
@@ -135,17 +135,18 @@ def test_a_save_that_fails_leaves_what_was_there(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["view.png"]
 
 
-def test_spectra_have_a_panel_for_each_incidence():
-    axes = ("pitch", "theta_i", "phi_i", "theta_o", "phi_o", "wavelength")
-    values = np.random.default_rng(1).uniform(size=(2, 3, 1, 4, 1, 5))
-    coordinates = {
-        "pitch": ("pitch", [2e-7, 3e-7]), "theta_i": ("theta_i", [-0.5, 0.0, 0.5]),
-        "theta_o": ("theta_o", [-0.3, -0.1, 0.1, 0.3]),
-        "wavelength": ("wavelength", np.linspace(4e-7, 7e-7, 5)),
-    }  # fmt: skip
-    figure = views.spectra(tables.array(values, axes, coordinates, "brdf", {}))
-    panels = [ax for ax in figure.axes if ax.collections and ax.get_title()]
-    assert [ax.get_title() for ax in panels][::5] == ["from -28.6°, pitch 200 nm", "from 28.6°, pitch 300 nm"]
-    drawn = np.asarray(panels[4].collections[0].get_array())
-    assert drawn.ravel() == pytest.approx(values[1, 1, 0, :, 0].ravel())
-    assert views.spectra(tables.array(0 * values, axes, coordinates, "brdf", {})).axes
+def test_maps_name_what_colours_they_have():
+    """Grey, and maps that are even to any eye; a cyclic one for what is cyclic."""
+    names = [shown(view(IMAGE, mm))[0].get_cmap().name for view in MAPS]
+    assert names == ["gray", "viridis", "PuOr", "twilight"]
+
+
+def test_maps_beside_one_another_keep_out_of_each_other():
+    """Nothing that is written reaches into other axes, or out of the figure."""
+    figure = Figure(figsize=(13, 9), layout="compressed")
+    axes = [view(IMAGE, mm, ax) for view, ax in zip(MAPS, figure.subplots(2, 2).flat, strict=True)]
+    figure.draw_without_rendering()
+    boxes = [ax.get_tightbbox() for ax in axes]
+    assert all(figure.bbox.x0 <= box.x0 and box.x1 <= figure.bbox.x1 for box in boxes)
+    assert all(figure.bbox.y0 <= box.y0 and box.y1 <= figure.bbox.y1 for box in boxes)
+    assert not [(a, b) for a in boxes for b in boxes if a is not b and a.overlaps(b)]

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
         elements,
         films,
         forms,
+        frames,
         goniometer,
         gratings,
         instruments,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
         phase,
         plates,
         polarisers,
+        records,
         scenes,
         shapes,
         spectra,
@@ -47,6 +49,7 @@ if TYPE_CHECKING:
         studies,
         swatches,
         sweeps,
+        tables,
         vectors,
         views,
     )
@@ -82,6 +85,7 @@ __all__ = [
     "elements",
     "films",
     "forms",
+    "frames",
     "goniometer",
     "gratings",
     "instruments",
@@ -96,6 +100,7 @@ __all__ = [
     "phase",
     "plates",
     "polarisers",
+    "records",
     "scenes",
     "shapes",
     "spectra",
@@ -104,6 +109,7 @@ __all__ = [
     "studies",
     "swatches",
     "sweeps",
+    "tables",
     "trace",
     "um",
     "validity",
@@ -113,9 +119,10 @@ __all__ = [
 
 # rooms that are imported at first use
 _ROOMS = (
-    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "goniometer", "gratings",
-    "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers", "scenes",
-    "shapes", "spectra", "spheres", "studies", "swatches", "sweeps", "vectors", "views",
+    "bsdf", "crystals", "cylinders", "elements", "films", "forms", "frames", "goniometer",
+    "gratings", "instruments", "lattices", "lenses", "materials", "meshes", "phase", "plates", "polarisers",
+    "records", "scenes", "shapes", "spectra", "spheres", "studies", "swatches", "sweeps", "tables", "vectors",
+    "views",
 )  # fmt: skip
 
 

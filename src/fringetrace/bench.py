@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fringetrace import guards, phase
+from fringetrace import guards, phase, records
 from fringetrace.arms import path_slope, pixel_centres
 from fringetrace.budget import Budget, budget
 from fringetrace.rig import Light, Rig
 from fringetrace.waves import ComplexArray, FloatArray, wavenumber
+
+if TYPE_CHECKING:
+    from fringetrace.tables import Axes, Dataset
+
+
+def stepped(steps: int) -> Axes:
+    """The axis of phase-stepped frames: a period in equal steps, radians."""
+    return {"step": (2.0 * math.pi * np.arange(steps) / steps, "rad")}
 
 
 class Bench(Rig):
@@ -113,7 +122,7 @@ class Bench(Rig):
         """
         if steps < 3:
             raise ValueError(f"phase steps: expected at least 3, got {steps}")
-        shifts = 2.0 * math.pi * np.arange(steps) / steps
+        shifts = stepped(steps)["step"][0]
 
         def frames() -> FloatArray:
             return np.stack([self._recorded(light, shift) for shift in shifts])
@@ -204,3 +213,37 @@ class Bench(Rig):
             As `height`.
         """
         return np.asarray(-2.0 * self.height(wavelength, steps), dtype=np.float64)
+
+    def dataset(self, wavelength: float, steps: int = 4) -> Dataset:
+        """Everything that is recorded at a wavelength, labelled: for xarray, plots, and NetCDF files.
+
+        Parameters
+        ----------
+        wavelength : float, metres
+        steps : int, at least 3
+
+        Returns
+        -------
+        xarray.Dataset
+            interferogram, frames, wrapped_phase, and the field as field_real and field_imag (of polarised
+            light with an axis component), over y and x in metres; wavelength, pitch, tilt and convention in
+            the attributes. `fringetrace.tables.write_netcdf` writes it.
+
+        Warns
+        -----
+        FringetraceWarning
+            As `interferogram`.
+        """
+        field = self.field(wavelength)
+        axes = ("component",) * (field.ndim - 2)
+        images = {
+            "interferogram": self.interferogram(wavelength),
+            "frames": (("step",), self.phase_steps(wavelength, steps)),
+            "wrapped_phase": self.wrapped(wavelength, steps),
+            "field_real": (axes, field.real),
+            "field_imag": (axes, field.imag),
+        }
+        return records.dataset(
+            images, self.ccd.pitch, stepped(steps), wavelength_m=wavelength,
+            reference_tilt_rad=list(self.tilt), method=self.method,
+        )  # fmt: skip

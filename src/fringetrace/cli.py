@@ -16,9 +16,8 @@ from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
 from fringetrace import commands
-from fringetrace.drawing import unit_of
 from fringetrace.mesh import Mesh
-from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length
+from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length, unit_of
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -37,6 +36,7 @@ app.command(commands.brdf)
 app.command(commands.lattice)
 app.command(commands.run)
 app.command(commands.init)
+app.command(commands.view)
 
 FRINGES = 10.0
 # The demo's relief and aperture: slopes that 512 pixels still resolve.
@@ -69,6 +69,9 @@ class Settings:
         Default: one for each core.
     picture
         Draw the scene in 3D (scene.png); this needs OpenGL libraries.
+    zygo
+        Leave the measured height as a file of Zygo's, too: dat (MetroPro: height.dat), datx (Mx:
+        height.datx), or both.
     """
 
     wavelength: str = "632.8 nm"
@@ -78,6 +81,7 @@ class Settings:
     tilt: str | None = None
     threads: int | None = None
     picture: bool = True
+    zygo: tuple[str, ...] = ()
 
 
 @app.command
@@ -103,9 +107,9 @@ def interferogram(
     Parameters
     ----------
     mesh
-        STL, PLY, OBJ or GLB file; or a Zygo MetroPro .dat height map.
+        STL, PLY, OBJ or GLB file; or a height map of Zygo's, MetroPro .dat or Mx .datx.
     unit
-        Unit of the numbers in the mesh file: nm, um, mm, m, ... A .dat file knows its own.
+        Unit of the numbers in the mesh file: nm, um, mm, m, ... Zygo's files know their own.
     out
         Folder to write to. Default: fringetrace-NAME, after the mesh, in this folder.
     aperture
@@ -206,6 +210,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
         measurement.write_camera(measured, folder)
         measurement.write_pictures(measured, folder)
         measurement.write_netcdf(measured, folder / "result.nc")
+        measurement.write_heights(measured, folder, settings.zygo)
         costs, notes = costing.result()
         _say(console, "budget", f"of the image: {costs.line}")
         for note in notes:
@@ -225,6 +230,8 @@ def _bench(
 
     if settings.steps < 3:
         raise ValueError(f"--steps: expected at least 3, got {settings.steps}")
+    if wrong := set(settings.zygo) - {"dat", "datx"}:
+        raise ValueError(f"--zygo: expected dat or datx, got {wrong.pop()!r}")
     if settings.pixels < 1:
         raise ValueError(f"--pixels: expected at least 1, got {settings.pixels}")
     low, high = mesh.bounds

@@ -13,7 +13,9 @@ from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
 
 if TYPE_CHECKING:
     from fringetrace.mesh import Mesh
+    from fringetrace.paths import Paths
     from fringetrace.rods import Lattice
+    from fringetrace.scene import Scene
     from fringetrace.tables import DataArray
 
 # What there is to say, each under a word.
@@ -22,6 +24,7 @@ Lines = list[tuple[str, str]]
 WAVELENGTHS = ("300 nm", "700 nm", "401")
 FILES = ("brdf.nc", "brdf.csv", "spectra.png")
 LAYERS = "reflectance.csv"
+MEASURED = "measured.png"
 # Part of the largest extent up to which a part counts as flat.
 FLAT = 1e-6
 
@@ -40,6 +43,7 @@ def brdf(
     reflectance: float = 1.0,
     hemisphere: int = 0,
     feature: str | None = None,
+    measured: Path | None = None,
     threads: int | None = None,
 ) -> Lines:
     """BRDF of a mesh of mirrors, its normal along z: spectra from each angle into each.
@@ -72,6 +76,9 @@ def brdf(
     feature
         Radius of the roundest small parts, to say what rays are worth. Default: half of the least extent
         of any connected part of the mesh.
+    measured
+        CSV file of measured reflectances, to be laid over the spectra towards the mirror's direction
+        (measured.png); a column of wavelengths, then one a sample.
     threads
         Default: one for each core.
     """
@@ -98,13 +105,13 @@ def brdf(
         )  # fmt: skip
         worth = validity(radius, float(table.wavelength.max()), CONDUCTOR)
         table.attrs |= worth.attributes
-        _write(table, part)
+        written = _write(table, part, measured)
     guess = "" if feature else f" (radius {radius:.3g} m estimated from the mesh's parts; --feature says it)"
     return [
         ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
         *_powers(table),
         ("rays", f"{worth}{guess}"),
-        ("written", f"{folder}: {', '.join(FILES)}"),
+        ("written", f"{folder}: {', '.join(written)}"),
     ]
 
 
@@ -127,6 +134,7 @@ def lattice(
     acceptance: str = "0.64 deg",
     rays: int = 2000,
     method: str = "rays",
+    measured: Path | None = None,
     scheduler: str | None = None,
 ) -> Lines:
     """BRDF of lattices of rods, for every combination of the values given.
@@ -161,6 +169,8 @@ def lattice(
         beside the rigorous one, of one lattice: reflectance.csv alone.
     rays
         Across a lattice.
+    measured
+        CSV file of measured reflectances, as in `fringetrace brdf`.
     scheduler
         Address of a Dask scheduler. Default: this machine's cores.
     """
@@ -183,21 +193,21 @@ def lattice(
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     waves = _steps(wavelengths, "--wavelengths", parse_length)
     if method == "multilayer":
-        return _endless(base, axes, theta[theta >= 0.0], waves, out)
+        return _endless(base, axes, theta[theta >= 0.0], waves, out, measured)
     table = studies.study(
         base, axes, theta, theta, waves, rays=rays,
         half_angle=parse_angle(acceptance, "--acceptance"), method=method,
         folder=os.fspath(out / "cells"), scheduler=scheduler,
     )  # fmt: skip
     with measurement.staged(out) as part:
-        _write(table, part)
+        written = _write(table, part, measured)
     count = int(np.prod([len(values) for values in axes.values()]))
     same = ", ".join(f"{name} {values[0]}" for name, values in spoken.items() if name not in axes)
     return [
         ("lattices", f"{count} of {', '.join(axes) or 'one kind'}; {same}"),
         *_powers(table),
         ("rays", f"at worst: {table.attrs['validity']}"),
-        ("written", f"{out}: {', '.join(FILES)}"),
+        ("written", f"{out}: {', '.join(written)}"),
     ]
 
 
@@ -237,6 +247,92 @@ def init(name: str, /) -> Iterator[tuple[str, str]]:
     yield "", templates.template(name)
 
 
+def view(
+    scene: Path,
+    /,
+    *,
+    png: Path | None = None,
+    html: Path | None = None,
+    export: Path | None = None,
+    unit: str | None = None,
+    wavelength: str | None = None,
+    colour: str = "route",
+    rays: int = 12,
+    surfaces: str = "interface",
+    allow_outside: bool = False,
+) -> Lines:
+    """Look at a scene file, or at a mesh: in a window, or in files that say what they show.
+
+    Parameters
+    ----------
+    scene
+        TOML file, see `fringetrace init`; or a mesh file, with --unit.
+    png
+        Picture to write.
+    html
+        Page for a browser to write; it needs neither network nor server (pip install 'fringetrace[html]').
+    export
+        Surfaces and rays for other programs: a .glb, .ply or .vtp file to write, in metres.
+    unit
+        Unit of the numbers in a mesh file: nm, um, mm, m, ...
+    wavelength
+        Of phases and of the image on the CCD. Default: the first of the scene file.
+    colour
+        Of rays: route, beam, bounce, length, phase, fate or power.
+    rays
+        Along the longer side of each beam.
+    surfaces
+        Coloured by interface, or by name.
+    allow_outside
+        Let a scene file name meshes and other files that are not in its own folder.
+    """
+    from fringetrace import exhibits
+
+    at = None if wavelength is None else parse_length(wavelength, "--wavelength")
+    seen, paths, looks = _seen(scene, unit, at, rays, allow_outside)
+    looks |= {"colour": colour, "surfaces": surfaces}
+    if not (png or html or export):
+        exhibits.show(seen, paths, **looks)
+        return []
+    if png is not None:
+        exhibits.picture(seen, paths, png, **looks)
+    if html is not None:
+        exhibits.page(seen, paths, html, title=scene.stem, **looks)
+    if export is not None:
+        exhibits.export(seen, paths, export, **looks)
+    count = f"{sum(map(len, paths)):,} path ends of {len(paths)} beams" if paths else "no rays"
+    return [
+        ("scene", f"{len(seen.surfaces)} surfaces, {count}"),
+        ("written", ", ".join(str(path) for path in (png, html, export) if path is not None)),
+    ]
+
+
+def _seen(
+    path: Path, unit: str | None, wavelength: float | None, rays: int, allow_outside: bool
+) -> tuple[Scene, list[Paths], dict[str, Any]]:
+    """What a file has to show: a scene, paths, and how these are drawn."""
+    from fringetrace import meshes, runs, scenes
+    from fringetrace.interfaces import Mirror
+    from fringetrace.scene import Scene, Surface
+
+    if rays < 1:
+        raise ValueError(f"--rays: expected at least 1, got {rays}")
+    if path.suffix.lower() != ".toml":
+        return Scene((Surface(meshes.load(path, unit=unit), Mirror(), path.stem),)), [], {}
+    setup = scenes.load(path, allow_outside=allow_outside)
+    if wavelength is None and setup.wavelengths:
+        wavelength = setup.wavelengths[0]
+    scene, paths, image, reference = runs.seen(setup, wavelength, rays)
+    # as many as were traced are drawn
+    looks = {
+        "wavelength": wavelength,
+        "image": image,
+        "reference": reference,
+        "most": rays**2 * max(1, len(paths)),
+    }
+    return scene, paths, looks
+
+
 def _medium(text: str | None) -> Any:
     """A material's name, or an index; None for none."""
     try:
@@ -245,9 +341,16 @@ def _medium(text: str | None) -> Any:
         return text
 
 
-def _endless(base: Lattice, axes: dict[str, Any], theta: FloatArray, waves: FloatArray, out: Path) -> Lines:
+def _endless(
+    base: Lattice,
+    axes: dict[str, Any],
+    theta: FloatArray,
+    waves: FloatArray,
+    out: Path,
+    measured: Path | None,
+) -> Lines:
     """Specular spectra of endless rows, layered and rigorous."""
-    from fringetrace import measurement, studies, tables
+    from fringetrace import measurement, studies, tables, views
 
     if axes:
         raise ValueError(f"--method multilayer: expected one lattice, got several of {', '.join(axes)}")
@@ -257,12 +360,17 @@ def _endless(base: Lattice, axes: dict[str, Any], theta: FloatArray, waves: Floa
     table = tables.labelled([one.values for one in both], axes, name="reflectance", unit="1")
     with measurement.staged(out) as part:
         tables.write_rows(table, part / LAYERS)
+        if measured is not None:
+            first = table.isel(theta_i=0)
+            title = f"light from {float(first.theta_i) / degree:.3g}°"
+            ax = views.spectra(first, measured=tables.read_csv(measured), title=title)
+            views.save(ax, part / MEASURED)
     top = [one.isel(one.argmax(...)) for one in both]
     said = (f"{float(one):.3g} at {float(one.wavelength) * 1e9:.4g} nm" for one in top)
     return [
         ("largest", "layers {}, rods {}".format(*said)),
         ("rays", str(both[0].attrs["validity"])),
-        ("written", f"{out}: {LAYERS}"),
+        ("written", f"{out}: {LAYERS}" + (f", {MEASURED}" if measured else "")),
     ]
 
 
@@ -289,13 +397,18 @@ def _steps(given: tuple[str, str, str], what: str, parse: Any) -> FloatArray:
     return np.linspace(parse(first, what), parse(last, what), int(count))
 
 
-def _write(table: DataArray, folder: Path) -> None:
-    """brdf.nc, brdf.csv, spectra.png."""
+def _write(table: DataArray, folder: Path, measured: Path | None) -> tuple[str, ...]:
+    """brdf.nc, brdf.csv, spectra.png, and measured.png if there is something to lay over."""
     from fringetrace import tables, views
 
+    overlaid = None if measured is None else tables.read_csv(measured)
     tables.write_netcdf(table, folder / "brdf.nc")
     tables.write_rows(table, folder / "brdf.csv")
-    views.save(views.spectra(table), folder / "spectra.png")
+    views.save(views.overview(table), folder / "spectra.png")
+    if overlaid is None:
+        return FILES
+    views.save(views.mirror_spectra(table, overlaid), folder / MEASURED)
+    return (*FILES, MEASURED)
 
 
 def _powers(table: DataArray) -> Lines:

@@ -19,7 +19,7 @@ from fringetrace.vocabulary import Kind, Parameter, Recipe, Unit, call, concrete
 from fringetrace.waves import ComplexArray, FloatArray, parse_angle, parse_length
 
 # Mesh files that name no others, but for GLB, which is looked through.
-MESHES = (".dat", ".glb", ".npz", ".obj", ".ply", ".stl")
+MESHES = (".dat", ".datx", ".glb", ".npz", ".obj", ".ply", ".stl")
 CALLABLE = get_origin(Callable[[], None])
 
 

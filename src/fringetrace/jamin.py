@@ -153,8 +153,8 @@ def _plates(
     direction = unit(np.column_stack([slopes, np.ones(len(slopes))]))
     none = np.zeros((len(slopes), 3))
     rays = Meeting(
-        point=none, direction=direction, normal=none + np.array([0.0, 0.0, 1.0]), index=np.full(len(slopes), index),
-        field=none + np.array([1.0 + 0j, 0.0, 0.0]), wavelength=wavelength,
+        point=none, direction=direction, normal=none + np.array([0.0, 0.0, 1.0]),
+        index=np.full(len(slopes), index), field=none + np.array([1.0 + 0j, 0.0, 0.0]), wavelength=wavelength,
     )  # fmt: skip
     point = ShearPlate(axis, 1.0, *crystal).act(rays)[1].point
     assert point is not None

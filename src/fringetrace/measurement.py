@@ -3,35 +3,33 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace import tables
+from fringetrace import frames, records, tables
 from fringetrace.arms import path_slope, pixel_centres
-from fringetrace.bench import Bench
+from fringetrace.bench import Bench, stepped
 from fringetrace.field import chosen
 from fringetrace.mesh import Mesh
 from fringetrace.meshes import interpolate_height
 from fringetrace.paths import Ledger
 from fringetrace.waves import Array, FloatArray
+from fringetrace.zygo import write_height_map
 
 if TYPE_CHECKING:
     from fringetrace.tables import Dataset
 
 # A bend of this many waves a pixel is a step.
 STEP = 0.02
-# What a 16-bit camera counts at full scale.
-COUNTS = 65535
 LIBRARIES = ("fringetrace", "numpy", "embreex", "numba", "scikit-image")
 
 
@@ -165,14 +163,14 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
     # a pixel that is averaged shows a mean of both sides of a step
     averaged = chosen(bench.trace(wavelength), bench.method) == "wavefront"
     bend = STEP * wavelength if averaged else math.inf
-    frames, height = bench.phase_steps(wavelength, steps), bench.height(wavelength, steps)
+    height = bench.height(wavelength, steps)
     both = np.isfinite(height) & np.isfinite(truth)
     residual = np.where(both, height - truth, np.nan)
     return Measurement(
         wavelength=wavelength,
         pitch=bench.ccd.pitch,
         tilt=bench.tilt,
-        frames=frames,
+        frames=bench.phase_steps(wavelength, steps),
         wrapped=bench.wrapped(wavelength, steps),
         height=height,
         truth=truth,
@@ -228,38 +226,24 @@ def dataset(measurement: Measurement) -> Dataset:
         Coordinates x, y (metres) and step (radians); units in the attributes of each variable.
     """
     m = measurement
-    steps, *shape = m.frames.shape
-    x, y = pixel_centres((shape[0], shape[1]), m.pitch)
-    image, stack = ("y", "x"), ("step", "y", "x")
-    one = {"units": "1", "long_name": "irradiance / incident irradiance, |E|^2"}
-    variables = {
-        "interferogram": (image, m.interferogram, one),
-        "frames": (stack, m.frames, {**one, "comment": "phase-stepped: step is added to the reference"}),
-        "wrapped_phase": (
-            image,
-            m.wrapped,
-            {"units": "rad", "long_name": "reference - sample, with carrier"},
-        ),
-        "height": (image, m.height, {"units": "m", "comment": "up to a constant"}),
-        "mesh_height": (image, m.truth, {"units": "m", "long_name": "height of the mesh"}),
-        "residual": (image, m.residual, {"units": "m", "long_name": "height - mesh_height - mean"}),
-    }
-    coordinates = {
-        "x": ("x", x, {"units": "m"}),
-        "y": ("y", y, {"units": "m"}),
-        "step": ("step", 2.0 * np.pi * np.arange(steps) / steps, {"units": "rad"}),
+    images = {
+        "interferogram": m.interferogram,
+        "frames": (("step",), m.frames),
+        "wrapped_phase": m.wrapped,
+        "height": m.height,
+        "mesh_height": m.truth,
+        "residual": m.residual,
     }
     attributes = {
         "title": "Michelson interferogram",
         "wavelength_m": m.wavelength,
-        "pixel_pitch_m": m.pitch,
         "reference_tilt_rad": list(m.tilt),
         "residual_rms_m": m.rms(),
         "residual_rms_away_from_steps_m": m.rms(m.smooth),
         **{f"power_{name}": value for name, value in vars(m.ledger).items()},
         **{f"version_{name}": version(name) for name in LIBRARIES},
     }
-    return tables.dataset(variables, coordinates, attributes)
+    return records.dataset(images, m.pitch, stepped(len(m.frames)), **attributes)
 
 
 def write_netcdf(measurement: Measurement, path: Path) -> None:
@@ -273,24 +257,6 @@ def write_netcdf(measurement: Measurement, path: Path) -> None:
     tables.write_netcdf(dataset(measurement), path)
 
 
-def counts(images: FloatArray, full_scale: float) -> Array:
-    """Irradiance as a 16-bit camera counts it, top row first.
-
-    Parameters
-    ----------
-    images : (..., rows, columns) float64
-        |E|^2.
-    full_scale : float
-        |E|^2 of 65535 counts.
-
-    Returns
-    -------
-    (..., rows, columns) uint16
-        Rounded; first the row with the largest y, as picture files have it.
-    """
-    return np.rint(images[..., ::-1, :] * (COUNTS / full_scale)).clip(0, COUNTS).astype(np.uint16)
-
-
 def write_camera(measurement: Measurement, folder: Path) -> None:
     """interferogram.tif and frames.tif: 16-bit, with the full scale in their description.
 
@@ -301,38 +267,22 @@ def write_camera(measurement: Measurement, folder: Path) -> None:
     """
     m = measurement
     for name, images in (("interferogram", m.interferogram), ("frames", m.frames)):
-        write_counts(folder / f"{name}.tif", images, m.pitch, m.full_scale, wavelength_m=m.wavelength)
+        path = folder / f"{name}.tif"
+        frames.save(images, m.pitch, path, full_scale=m.full_scale, wavelength_m=m.wavelength)
 
 
-def write_counts(path: Path, images: FloatArray, pitch: float, full_scale: float, **notes: Any) -> None:
-    """Irradiances as a 16-bit TIFF file, with the full scale in its description.
+def write_heights(measurement: Measurement, folder: Path, kinds: Iterable[str]) -> None:
+    """height.dat or height.datx: the measured height as a file of Zygo's.
 
     Parameters
     ----------
-    path : Path
-    images : (..., rows, columns) float64
-        |E|^2.
-    pitch : float, metres
-    full_scale : float
-        |E|^2 of 65535 counts.
-    **notes
-        For the description, too.
+    measurement : Measurement
+    folder : Path
+    kinds : iterable of {"dat", "datx"}
     """
-    import tifffile
-
-    described = {
-        "full_scale": full_scale,
-        "full_scale_meaning": "|E|^2 of 65535 counts; 1 is the incident irradiance",
-        **notes,
-        "pixel_pitch_m": pitch,
-        "first_row": "largest y",
-    }
-    per_centimetre = 0.01 / pitch
-    tifffile.imwrite(
-        path, counts(images, full_scale), photometric="minisblack", description=json.dumps(described),
-        metadata=None, resolution=(per_centimetre, per_centimetre), resolutionunit="CENTIMETER",
-        software="fringetrace",
-    )  # fmt: skip
+    m = measurement
+    for kind in kinds:
+        write_height_map(m.height, m.pitch, folder / f"height.{kind}", wavelength=m.wavelength)
 
 
 def write_pictures(measurement: Measurement, folder: Path) -> None:

@@ -19,6 +19,8 @@ DEGENERATE = 1e-14
 FARTHEST = 1e9
 # Beyond these a length squared leaves the range of float64 numbers that keep all their digits.
 LARGEST, SMALLEST = 1e100, 1e-100
+# What trimesh calls a metre, and what it makes of None.
+METRES = ("none", "m", "meter", "meters", "metre", "metres")
 
 
 def _named(indices: Array, limit: int = 5) -> str:
@@ -209,11 +211,12 @@ class Mesh:
 
 
 def as_mesh(value: Any, name: str = "mesh") -> Mesh:
-    """A Mesh from anything with `vertices` and `faces`, such as trimesh.Trimesh (in metres).
+    """A Mesh from one of another library, whose numbers are taken as metres.
 
     Parameters
     ----------
-    value : Mesh, trimesh.Trimesh, or alike
+    value : Mesh, trimesh.Trimesh, pyvista.PolyData, or anything else with `vertices` and `faces`
+        Polygons and strips of a PolyData are cut into triangles; point data are left behind.
     name : str
 
     Returns
@@ -223,13 +226,33 @@ def as_mesh(value: Any, name: str = "mesh") -> Mesh:
     Raises
     ------
     TypeError
-        If the value has no vertices and faces.
+        If the value is no mesh.
+    ValueError
+        If it says that its unit is another one, has lines or loose points, or see `Mesh`.
     """
     if isinstance(value, Mesh):
         return value
+    if all(hasattr(value, part) for part in ("points", "faces", "triangulate")):
+        return Mesh(value.points, _triangles(value, name), name)
     if not (hasattr(value, "vertices") and hasattr(value, "faces")):
         raise TypeError(
-            f"{name}: expected a mesh with vertices and faces, got {type(value).__name__}; "
-            "files are read by fringetrace.meshes.load"
+            f"{name}: expected a mesh with vertices and faces, or a pyvista.PolyData, got "
+            f"{type(value).__name__}; files are read by fringetrace.meshes.load, and other data of pyvista "
+            "have a surface, extract_surface()"
+        )
+    unit = getattr(value, "units", None)
+    if unit is not None and unit not in METRES:
+        raise ValueError(
+            f"{name}: expected a mesh in metres, got one in {unit}; call its convert_units('meters') first"
         )
     return Mesh(value.vertices, value.faces, name)
+
+
+def _triangles(polydata: Any, name: str) -> Array:
+    """Faces (f, 3) of a pyvista.PolyData."""
+    loose = {"lines": polydata.n_lines, "loose points": polydata.n_verts}
+    if found := ", ".join(f"{count} {kind}" for kind, count in loose.items() if count):
+        raise ValueError(f"{name}: expected a PolyData of faces only, got {found}")
+    if polydata.n_strips or not polydata.is_all_triangles:
+        polydata = polydata.triangulate()
+    return np.asarray(polydata.faces).reshape(-1, 4)[:, 1:]

@@ -1,4 +1,4 @@
-"""Meshes and height maps in files: load, save, read; the height above points; and the built shapes.
+"""Meshes in files and other libraries: load, save, give; the height above points; and the built shapes.
 
 Meshes are `fringetrace.scene.Mesh`, in metres. Height maps are arrays [row, column] with origin
 lower: column counts along x, row along y, heights along z, seen from +z.
@@ -12,12 +12,12 @@ import os
 import warnings
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.mesh import Mesh, Source
+from fringetrace.mesh import Mesh, Source, as_mesh
 from fringetrace.shapes import (
     corner_cube,
     extrude,
@@ -29,8 +29,14 @@ from fringetrace.shapes import (
     staircase,
     step,
 )
+from fringetrace.tables import whole
 from fringetrace.triangles import IndexArray, height_above, weld
 from fringetrace.waves import FloatArray, checked_length, unit_length
+from fringetrace.zygo import KINDS, existing, read_height_map, write_height_map
+
+if TYPE_CHECKING:
+    from pyvista import PolyData
+    from trimesh import Trimesh
 
 __all__ = [
     "corner_cube",
@@ -47,23 +53,17 @@ __all__ = [
     "save",
     "staircase",
     "step",
+    "to_pyvista",
+    "to_trimesh",
+    "write_height_map",
 ]
 
 WRITTEN = (".glb", ".npz", ".obj", ".ply", ".stl")
 ARCHIVE = ".npz"
-METROPRO = ".dat"
-# First four bytes of the three versions of Zygo's format.
-METROPRO_MAGIC = (b"\x88\x1b\x03\x6f", b"\x88\x1b\x03\x70", b"\x88\x1b\x03\x71")
-
-
-def _existing(path: str | os.PathLike[str]) -> Path:
-    if not Path(path).is_file():
-        raise FileNotFoundError(f"{path}: expected an existing file, got none there")
-    return Path(path)
 
 
 def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
-    """Mesh from a file: STL, PLY, OBJ, GLB, and whatever else trimesh can read; Zygo MetroPro `.dat`; `.npz`.
+    """Mesh from a file: STL, PLY, OBJ, GLB, and whatever else trimesh can read; Zygo `.dat`, `.datx`; `.npz`.
 
     Vertices with equal coordinates are welded and faces without area dropped. A file of several
     parts becomes one mesh, each part where the file puts it; the faces of a part keep their order.
@@ -73,13 +73,13 @@ def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
     ----------
     path : path-like
     unit : str
-        Unit of the numbers in the file, such as ``"um"``: mesh files carry none. Only a MetroPro
-        file knows its own, and `unit` is not looked at.
+        Unit of the numbers in the file, such as ``"um"``: mesh files carry none. Only Zygo's
+        files know their own, and `unit` is not looked at.
 
     Returns
     -------
     Mesh, metres
-        A MetroPro file gives ``height_map(*read_height_map(path))``.
+        A file of Zygo's gives ``height_map(*read_height_map(path))``.
 
     Raises
     ------
@@ -95,17 +95,17 @@ def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
 
 def _loaded(path: str | os.PathLike[str], unit: str | None) -> Mesh:
     suffix = Path(path).suffix.lower()
-    if suffix == METROPRO:
+    if suffix in KINDS:
         z, pitch = read_height_map(path)
         return height_map(z, pitch, name=Path(path).name)
     if suffix == ARCHIVE:
-        return _archived(_existing(path), unit_length(unit, f"{Path(path).name} unit"))
+        return _archived(existing(path), unit_length(unit, f"{Path(path).name} unit"))
     from trimesh.exchange.load import mesh_formats
 
-    known = sorted({METROPRO, ARCHIVE} | {f".{kind}" for kind in mesh_formats()})
+    known = sorted({*KINDS, ARCHIVE} | {f".{kind}" for kind in mesh_formats()})
     if suffix not in known:
         raise ValueError(f"{path}: expected a file named {', '.join(known)}, got {suffix or 'no suffix'!r}")
-    file = _existing(path)
+    file = existing(path)
     scale = unit_length(unit, f"{file.name} unit")
     vertices, faces = weld(*_parsed(file))
     try:
@@ -173,7 +173,7 @@ def save(mesh: Mesh, path: str | os.PathLike[str], unit: str) -> None:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh, trimesh.Trimesh or pyvista.PolyData, metres
     path : path-like
     unit : str
         Unit of the numbers in the file, such as ``"um"``.
@@ -190,13 +190,10 @@ def save(mesh: Mesh, path: str | os.PathLike[str], unit: str) -> None:
         raise ValueError(
             f"{path}: expected a file named {', '.join(WRITTEN)}, got {file.suffix or 'no suffix'!r}"
         )
+    mesh = as_mesh(mesh)
     content = _content(mesh.vertices / unit_length(unit, f"{file.name} unit"), mesh.faces, file)
-    beside = file.with_name(f".{file.name}.{os.getpid()}.part")
-    try:
-        beside.write_bytes(content.encode() if isinstance(content, str) else content)
-        os.replace(beside, file)
-    finally:
-        beside.unlink(missing_ok=True)
+    with whole(file) as part:
+        part.write_bytes(content.encode() if isinstance(content, str) else content)
 
 
 def _content(vertices: FloatArray, faces: IndexArray, file: Path) -> Any:
@@ -212,50 +209,45 @@ def _content(vertices: FloatArray, faces: IndexArray, file: Path) -> Any:
     return trimesh.Trimesh(vertices, faces, process=False).export(file_type=kind[1:], **options)
 
 
-def read_height_map(path: str | os.PathLike[str]) -> tuple[FloatArray, float]:
-    """Measured heights from a Zygo MetroPro `.dat` file.
+def to_trimesh(mesh: Mesh) -> Trimesh:
+    """A mesh for trimesh, in metres, with its vertices and faces as they are.
 
     Parameters
     ----------
-    path : path-like
+    mesh : Mesh
 
     Returns
     -------
-    z : (rows, columns) float64, metres
-        NaN where the instrument found no height. The file begins with the top row of the picture;
-        here row 0 is the bottom one.
-    pitch : float, metres
-        Distance of neighbouring pixels.
-
-    Raises
-    ------
-    FileNotFoundError
-        If there is no such file.
-    ValueError
-        If it is no MetroPro file, is cut short, or was written without a lateral calibration.
+    trimesh.Trimesh
+        A copy, which may be changed; nothing is merged. It knows its name and unit.
     """
-    file = _existing(path)
-    if file.suffix.lower() != METROPRO:
-        raise ValueError(f"{path}: expected a MetroPro height map named {METROPRO}, got {file.suffix!r}")
-    with file.open("rb") as stream:
-        magic = stream.read(4)
-    if magic not in METROPRO_MAGIC:
-        raise ValueError(f"{path}: expected a MetroPro file, got one that begins with {magic!r}")
-    from prysm.io import read_zygo_dat
+    import trimesh
 
-    try:
-        content = read_zygo_dat(file)
-    except Exception as error:  # a header cut short raises struct.error, odd ones KeyError
-        raise ValueError(
-            f"{path}: expected a whole MetroPro file, got one that does not parse: {error}"
-        ) from error
-    meta = content["meta"]
-    pitch = float(meta["lateral_resolution"])
-    if not pitch > 0.0:
-        raise ValueError(f"{path}: expected a calibrated map, got a lateral resolution of {pitch:g} m")
-    upwards = -1.0 if meta["sign"] else 1.0  # prysm leaves the header's sign to its caller
-    # prysm gives nanometres
-    return np.asarray(content["phase"][::-1] * (upwards * 1e-9), dtype=np.float64), pitch
+    arrays = mesh.vertices.copy(), mesh.faces.copy()
+    given = trimesh.Trimesh(*arrays, process=False, metadata={"name": mesh.name})
+    given.units = "meters"
+    return given
+
+
+def to_pyvista(mesh: Mesh) -> PolyData:
+    """A mesh for pyvista, in metres, with its vertices and faces as they are.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    pyvista.PolyData
+        A copy in float64, which may be changed; name and unit are in its field data.
+    """
+    import pyvista
+
+    corners: Any = mesh.faces
+    given: PolyData = pyvista.PolyData.from_regular_faces(mesh.vertices.copy(), corners)
+    given.add_field_data([mesh.name], "name")
+    given.add_field_data(["m"], "unit")
+    return given
 
 
 def elevation_sample(relief: float, aperture: float) -> tuple[FloatArray, float]:
@@ -289,7 +281,7 @@ def elevation_sample(relief: float, aperture: float) -> tuple[FloatArray, float]
     found = importlib.util.find_spec("matplotlib")  # finds the folder without importing it
     folder = Path(found.origin).parent if found is not None and found.origin else Path()
     file = folder / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
-    with np.load(_existing(file), allow_pickle=False) as data:
+    with np.load(existing(file), allow_pickle=False) as data:
         metres = data["elevation"][::-1].astype(np.float64)
     z = relief * (metres - metres.min()) / np.ptp(metres)
     return z, aperture / (max(z.shape) - 1)
@@ -300,7 +292,7 @@ def interpolate_height(mesh: Mesh, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatA
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh : Mesh, trimesh.Trimesh or pyvista.PolyData, metres
     x, y : float64, metres, shapes that broadcast
 
     Returns
@@ -310,7 +302,7 @@ def interpolate_height(mesh: Mesh, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatA
         Upright faces have no height.
     """
     points = np.stack(np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64)), axis=-1)
-    height = np.full(points.shape[:-1], np.nan)
+    mesh, height = as_mesh(mesh), np.full(points.shape[:-1], np.nan)
     somewhere = np.isfinite(points).all(axis=-1)
     if somewhere.any():
         height[somewhere] = height_above(mesh.vertices[mesh.faces], points[somewhere])

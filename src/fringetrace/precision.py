@@ -322,11 +322,11 @@ def write(done: Iterable[Run], folder: Path) -> None:
     every = list(done)
     content = {"wavelength_m": WAVELENGTH, **machine(), "runs": [asdict(one) for one in every]}
     (folder / FILES[0]).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    views.save(views.work_precision(panels(every)), folder / FILES[1])
+    views.save(views.comparison(panels(every)), folder / FILES[1])
 
 
-def panels(done: Iterable[Run]) -> views.Panels:
-    """Runs as `views.work_precision` draws them.
+def panels(done: Iterable[Run]) -> dict[str, dict[str, FloatArray]]:
+    """Runs as `views.comparison` draws them.
 
     Parameters
     ----------

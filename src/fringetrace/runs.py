@@ -13,19 +13,19 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace import guards, measurement, tables
-from fringetrace.arms import pixel_centres
+from fringetrace import frames, guards, measurement, records, tables
+from fringetrace.arms import Mark
 from fringetrace.bench import Bench
+from fringetrace.exhibits import few as few
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.media import needs
 from fringetrace.paths import Fate, Ledger, Paths
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.scenes import Setup
 from fringetrace.trace import trace
 from fringetrace.waves import Array, ComplexArray, FloatArray, nm
+from fringetrace.zygo import write_height_map
 
-# Rays of the 3D picture along the longer side.
-DRAWN = 12
 # Outputs that need no CCD.
 BLIND = ("paths.nc", "scene.png")
 
@@ -191,13 +191,18 @@ def _named(wavelength: float) -> str:
     return f"{wavelength / nm:.7g} nm"
 
 
+def _marked(name: str, current: Run) -> Iterator[tuple[float, str]]:
+    """Wavelengths, and the name of a file at each: after the wavelength, too, if there are several."""
+    several = len(current.setup.wavelengths) > 1
+    for wavelength in current.setup.wavelengths:
+        yield wavelength, f"{name}-{_named(wavelength).replace(' ', '')}" if several else name
+
+
 def _pictures(name: str, current: Run, folder: Path, draw: Callable[[float], Any]) -> None:
     """A picture for each wavelength, named after it if there are several."""
     from fringetrace import views
 
-    several = len(current.setup.wavelengths) > 1
-    for wavelength in current.setup.wavelengths:
-        marked = f"{name}-{_named(wavelength).replace(' ', '')}" if several else name
+    for wavelength, marked in _marked(name, current):
         views.save(draw(wavelength), folder / f"{marked}.png")
 
 
@@ -209,6 +214,17 @@ def _interferogram_png(current: Run, folder: Path) -> None:
         return views.interferogram(image, current.ccd.pitch, wavelength=wavelength, title="Interferogram")
 
     _pictures("interferogram", current, folder, draw)
+
+
+def _height_map(kind: str) -> Callable[[Run, Path], None]:
+    """A writer of the height as a file of Zygo's, one for each wavelength."""
+
+    def write(current: Run, folder: Path) -> None:
+        for wavelength, marked in _marked("height", current):
+            z = _height(current, wavelength)
+            write_height_map(z, current.ccd.pitch, folder / f"{marked}.{kind}", wavelength=wavelength)
+
+    return write
 
 
 def _height_png(current: Run, folder: Path) -> None:
@@ -241,44 +257,35 @@ def _tif(name: str, find: Callable[[Run, float], FloatArray]) -> Callable[[Run, 
 
     def write(current: Run, folder: Path) -> None:
         images = _stack(current, lambda wavelength: find(current, wavelength))
-        scale = max(1.0, float(images.max()))
         images = images[0] if len(images) == 1 else images
         wavelengths = list(current.setup.wavelengths)
-        measurement.write_counts(folder / name, images, current.ccd.pitch, scale, wavelengths_m=wavelengths)
+        frames.save(images, current.ccd.pitch, folder / name, wavelengths_m=wavelengths)
 
     return write
 
 
-def _images(current: Run, folder: Path, name: str, variables: dict[str, Any]) -> None:
+def _images(current: Run, folder: Path, name: str, images: dict[str, Array]) -> None:
     """Labelled images (wavelength, [component,] y, x) as NetCDF."""
-    x, y = pixel_centres(current.ccd.shape, current.ccd.pitch)
-    coordinates = {
-        "wavelength": ("wavelength", np.array(current.setup.wavelengths), {"units": "m"}),
-        "x": ("x", x, {"units": "m"}),
-        "y": ("y", y, {"units": "m"}),
+    labelled = {
+        what: (("wavelength", "component")[: values.ndim - 2], values) for what, values in images.items()
     }
-    attributes = {"pixel_pitch_m": current.ccd.pitch, "method": current.method}
-    tables.write_netcdf(tables.dataset(variables, coordinates, attributes), folder / name)
+    axes = {"wavelength": (np.array(current.setup.wavelengths), "m")}
+    table = records.dataset(labelled, current.ccd.pitch, axes, method=current.method)
+    tables.write_netcdf(table, folder / name)
 
 
 def _interferogram_nc(current: Run, folder: Path) -> None:
-    notes = {"units": "1", "long_name": "irradiance / incident irradiance, |E|^2"}
-    light = {"interferogram": (("wavelength", "y", "x"), _stack(current, current.image), notes)}
-    _images(current, folder, "interferogram.nc", light)
+    _images(current, folder, "interferogram.nc", {"interferogram": _stack(current, current.image)})
 
 
 def _height_nc(current: Run, folder: Path) -> None:
     heights = _stack(current, lambda wavelength: _height(current, wavelength))
-    notes = {"units": "m", "comment": "up to a constant"}
-    _images(current, folder, "height.nc", {"height": (("wavelength", "y", "x"), heights, notes)})
+    _images(current, folder, "height.nc", {"height": heights})
 
 
 def _field_nc(current: Run, folder: Path) -> None:
     light = _stack(current, current.field)
-    axes = ("wavelength", "y", "x") if light.ndim == 3 else ("wavelength", "component", "y", "x")
-    notes = {"units": "1", "comment": "field ~ exp(+i k OPL); components along columns, rows, normal"}
-    parts = {"field_real": (axes, light.real, notes), "field_imag": (axes, light.imag, notes)}
-    _images(current, folder, "field.nc", parts)
+    _images(current, folder, "field.nc", {"field_real": light.real, "field_imag": light.imag})
 
 
 def _paths_nc(current: Run, folder: Path) -> None:
@@ -312,19 +319,36 @@ def _paths_nc(current: Run, folder: Path) -> None:
     tables.write_netcdf(tables.dataset(variables, {}, {}), folder / "paths.nc")
 
 
-def few(shape: tuple[int, int]) -> tuple[int, int]:
-    """A grid of rays of the same proportions, few enough to look at.
+def seen(
+    setup: Setup, wavelength: float | None, rays: int
+) -> tuple[Scene, list[Paths], FloatArray | None, Mark | None]:
+    """A setup to be looked at.
 
     Parameters
     ----------
-    shape : (rows, columns)
+    setup : Setup
+    wavelength : float, metres, optional
+        None: the first that it names, if it names any.
+    rays : int
+        Along the longer side of each beam.
 
     Returns
     -------
-    (rows, columns)
+    scene : Scene
+    paths : list of Paths
+        Of each beam, recorded.
+    image : (rows, columns) float64, or None
+        What the CCD shows, if there is one, and a wavelength.
+    reference : Mark or None
+        What a phase step turns, of a bench.
     """
-    rows, columns = (max(1, round(DRAWN * n / max(shape))) for n in shape)
-    return rows, columns
+    current = Run(setup)
+    bench, ccd = current.bench, setup.ccd if current.bench is None else current.ccd
+    beams = [replace(beam, shape=few(beam.shape, rays)) for beam in current.beams]
+    paths = [current.traced(beam, ccd, wavelength, record=True) for beam in beams]
+    image = None if ccd is None or wavelength is None or not beams else current.image(wavelength)
+    reference = None if bench is None else bench.mark or Mark(bench.reference)
+    return setup.scene, paths, image, reference
 
 
 def _scene_png(current: Run, folder: Path) -> str | None:
@@ -353,4 +377,6 @@ WRITERS: dict[str, Callable[[Run, Path], str | None]] = {
     "frames.tif": _tif("frames.tif", _frames),
     "height.png": _height_png,
     "height.nc": _height_nc,
+    "height.dat": _height_map("dat"),
+    "height.datx": _height_map("datx"),
 }

@@ -35,7 +35,7 @@ class Surface:
 
     Parameters
     ----------
-    mesh : Mesh, trimesh.Trimesh, or alike, metres
+    mesh : Mesh, trimesh.Trimesh, pyvista.PolyData, or alike, metres
     interface : Interface, Dielectric, Metal, or one of `fringetrace.elements`
         `Mirror`, `Absorber`, `BeamSplitter`; `Dielectric`, `Metal`; thin optical elements.
     name : str

@@ -21,7 +21,7 @@ __all__ = ["OUTPUTS", "Recipe", "Setup", "load", "parsed", "save"]
 # What can be asked for; the second half takes a bench.
 OUTPUTS = (
     "interferogram.png", "interferogram.tif", "interferogram.nc", "field.nc", "paths.nc", "scene.png",
-    "frames.tif", "height.png", "height.nc",
+    "frames.tif", "height.png", "height.nc", "height.dat", "height.datx",
 )  # fmt: skip
 STEPPED = OUTPUTS[6:]
 # What a bench brings along.

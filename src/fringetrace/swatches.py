@@ -9,17 +9,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace import spectra
-from fringetrace.views import STYLES, blank
+from fringetrace.curves import STYLES, blank, edges, lay_over, rainbow
 from fringetrace.waves import FloatArray, nm
 
 if TYPE_CHECKING:
+    from fringetrace.curves import Axes
     from fringetrace.tables import DataArray
-    from fringetrace.views import Axes
 
 # What is behind a sphere.
 BEHIND = (0.12, 0.12, 0.12)
-# Spectral colours are shown this bright, of what the brightest of them would be.
-GLOW = 0.8
 
 
 def _colours(xyz: npt.ArrayLike, dimensions: int, gamut: str) -> FloatArray:
@@ -28,15 +26,6 @@ def _colours(xyz: npt.ArrayLike, dimensions: int, gamut: str) -> FloatArray:
         shape = ("n, 3", "rows, columns, 3")[dimensions - 2]
         raise ValueError(f"colours: expected X, Y, Z of shape ({shape}), got {values.shape}")
     return spectra.srgb(values, gamut)
-
-
-def _edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
-    """Halfway between neighbouring places, and as far beyond the last."""
-    at = np.asarray(places, dtype=np.float64)
-    if at.shape != (count,) or count < 2 or not (np.diff(at) > 0.0).all():
-        raise ValueError(f"{what}: expected {count} increasing numbers (at least 2), got shape {at.shape}")
-    middle = 0.5 * (at[1:] + at[:-1])
-    return np.concatenate([[2.0 * at[0] - middle[0]], middle, [2.0 * at[-1] - middle[-1]]])
 
 
 def swatches(
@@ -99,9 +88,9 @@ def strip(
         If shapes do not agree.
     """
     colours = _colours(xyz, 2, gamut)
-    edges = _edges(places, len(colours), "places")
+    sides = edges(places, len(colours), "places")
     ax = blank(7.0, 1.3) if ax is None else ax
-    ax.pcolormesh(edges, [0.0, 1.0], colours[None])
+    ax.pcolormesh(sides, [0.0, 1.0], colours[None])
     ax.set(xlabel=label, yticks=[])
     return ax
 
@@ -135,8 +124,8 @@ def angles(
         If shapes do not agree.
     """
     colours = _colours(xyz, 3, gamut)
-    up = np.degrees(_edges(theta_i, colours.shape[0], "theta_i"))
-    right = np.degrees(_edges(theta_o, colours.shape[1], "theta_o"))
+    up = np.degrees(edges(theta_i, colours.shape[0], "theta_i"))
+    right = np.degrees(edges(theta_o, colours.shape[1], "theta_o"))
     ax = blank(5.0, 4.4) if ax is None else ax
     ax.pcolormesh(right, up, colours)
     ax.set(xlabel=r"$\theta_o$ (to the eye) / °", ylabel=r"$\theta_i$ (to the light) / °", aspect="equal")
@@ -196,17 +185,6 @@ def mirrored(xyz: npt.ArrayLike, theta: npt.ArrayLike, pixels: int = 256) -> Flo
     return np.where(radius[..., None] < 1.0, picture, np.nan)
 
 
-def _rainbow(ax: Axes) -> None:
-    """The colours of the wavelengths, below the curves."""
-    low, high = ax.get_xlim()
-    edges = np.linspace(low, high, 401)
-    colours = spectra.observer(2, 0.5 * (edges[1:] + edges[:-1]) * nm)
-    below = ax.inset_axes((0.0, 0.0, 1.0, 0.05))
-    below.pcolormesh(edges, [0.0, 1.0], spectra.srgb(GLOW * colours / colours.max())[None])
-    below.set_axis_off()
-    below.set_xlim(low, high)
-
-
 def spectrum(
     reflectance: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
@@ -246,14 +224,11 @@ def spectrum(
         colour = STYLES[(row + 3) % len(STYLES)][0]
         ax.plot(at / nm, curve, color=colour, label=labels[row] if labels else None)
     if measured is not None:
-        overlaid = measured.transpose("sample", "wavelength")
-        for row, name in enumerate(overlaid["sample"].values):
-            line = ("--", ":", "-.")[row % 3]
-            ax.plot(overlaid["wavelength"] / nm, overlaid[row], line, color="black", label=str(name))
+        lay_over(ax, measured)
     ax.set(xlabel="wavelength / nm", ylabel="reflectance", xlim=(at[0] / nm, at[-1] / nm))
     top = ax.get_ylim()[1]
     ax.set_ylim(-0.06 * top, top)
-    _rainbow(ax)
+    rainbow(ax)
     if labels or measured is not None:
         ax.legend(frameon=False)
     return ax

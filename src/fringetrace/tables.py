@@ -98,8 +98,18 @@ def dataset(
 
 
 @contextmanager
-def _whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A path to write to; it moves to `path` at the end."""
+def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """A place to write a file, which then moves to its path: it is there in full or not at all.
+
+    Parameters
+    ----------
+    path : path
+
+    Yields
+    ------
+    Path
+        Of the same name, in an empty folder beside.
+    """
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=target.parent) as folder:
         part = Path(folder, target.name)
@@ -115,7 +125,7 @@ def write_netcdf(table: DataArray | Dataset, path: str | os.PathLike[str]) -> No
     table : xarray.DataArray or xarray.Dataset
     path : path
     """
-    with _whole(path) as part:
+    with whole(path) as part:
         table.to_netcdf(part, engine="h5netcdf")
 
 
@@ -132,7 +142,7 @@ def write_rows(table: DataArray, path: str | os.PathLike[str]) -> None:
 
     along = np.meshgrid(*(np.asarray(table[name]) for name in table.dims), indexing="ij")
     columns = {str(name): grid.ravel() for name, grid in zip(table.dims, along, strict=True)}
-    with _whole(path) as part:
+    with whole(path) as part:
         pandas.DataFrame({**columns, str(table.name): table.values.ravel()}).to_csv(part, index=False)
 
 
@@ -239,5 +249,5 @@ def write_csv(spectra: DataArray, path: str | os.PathLike[str]) -> None:
     rows = 100.0 * np.asarray(spectra.transpose("sample", "wavelength"))
     names = [str(name) for name in spectra["sample"].values]
     columns = {"wl": np.asarray(spectra["wavelength"]) / nm, **dict(zip(names, rows, strict=True))}
-    with _whole(path) as part:
+    with whole(path) as part:
         pandas.DataFrame(columns).to_csv(part, index=False, float_format="%.10g")

@@ -3,46 +3,45 @@
 from __future__ import annotations
 
 import os
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.drawing import opengl, picture, show, unit_of
-from fringetrace.waves import Array, FloatArray, checked_wavelength
+from fringetrace.curves import comparison, spectra, work_precision
+from fringetrace.exhibits import export, page, picture, show
+from fringetrace.itinerary import itinerary
+from fringetrace.lobes import brdf, mirror_spectra, overview, polar, spectrogram
+from fringetrace.offscreen import opengl
+from fringetrace.tables import whole
+from fringetrace.waves import Array, FloatArray, checked_wavelength, unit_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
     from matplotlib.figure import Figure
 
-    from fringetrace.tables import DataArray
-
 __all__ = [
+    "brdf",
+    "comparison",
+    "export",
     "height",
     "interferogram",
+    "itinerary",
+    "mirror_spectra",
     "opengl",
+    "overview",
+    "page",
     "phase",
     "picture",
+    "polar",
     "residual",
     "save",
     "show",
     "spectra",
+    "spectrogram",
     "work_precision",
 ]
 
 NO_LIGHT = "#D0D0D0"
-# Colours that colour-blind people tell apart (Okabe and Ito), with a mark and a line for each.
-STYLES = (
-    ("#999999", "x", ":"), ("#E69F00", "o", "--"), ("#56B4E9", "s", "--"), ("#D55E00", "^", "-"),
-    ("#0072B2", "D", "-"), ("#009E73", "v", "-"), ("#CC79A7", "P", "-"),
-)  # fmt: skip
-
-# Room around curves on logarithmic axes, a factor.
-MARGIN = 2.0
-
-# By panel and curve: rays, seconds, error.
-Panels = dict[str, dict[str, FloatArray]]
 
 
 def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
@@ -55,23 +54,6 @@ def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
     figure = Figure(figsize=(7.0, height))
     figure.subplots_adjust(left=0.11, right=0.85, bottom=0.65 / height, top=1.0 - 0.4 / height)
     axes: Axes = figure.add_subplot()
-    return axes
-
-
-def blank(width: float = 7.0, height: float = 4.0) -> Axes:
-    """Axes in a figure of their own.
-
-    Parameters
-    ----------
-    width, height : float, inches
-
-    Returns
-    -------
-    matplotlib Axes
-    """
-    from matplotlib.figure import Figure
-
-    axes: Axes = Figure(figsize=(width, height), layout="constrained").add_subplot()
     return axes
 
 
@@ -252,96 +234,6 @@ def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str |
     return ax
 
 
-def work_precision(panels: Panels) -> Figure:
-    """Error against seconds and against rays, a pair of axes for each panel, logarithmic, to one scale.
-
-    Parameters
-    ----------
-    panels : dict of dict of (3, n) float64
-        By panel and curve: rays, seconds, phase error in waves.
-
-    Returns
-    -------
-    matplotlib Figure
-
-    Raises
-    ------
-    ValueError
-        If there is nothing to draw.
-    """
-    from matplotlib.figure import Figure
-
-    if not panels:
-        raise ValueError("work_precision: expected at least one panel, got none")
-    labels = list(dict.fromkeys(label for curves in panels.values() for label in curves))
-    rows = (len(panels) + 1) // 2
-    every = np.concatenate([curve for curves in panels.values() for curve in curves.values()], axis=1)
-    shown = every.min(axis=1) / MARGIN, every.max(axis=1) * MARGIN
-    figure = Figure(figsize=(12.0, 1.0 + 2.6 * rows), layout="constrained")
-    parts = figure.subfigures(rows, 2, squeeze=False).ravel()
-    handles = {}
-    for part, (title, curves) in zip(parts, panels.items(), strict=False):
-        part.suptitle(title, fontsize="medium")
-        pair = part.subplots(1, 2, sharey=True)
-        for label, (rays, seconds, error) in curves.items():
-            colour, mark, line = STYLES[labels.index(label) % len(STYLES)]
-            style = {"color": colour, "marker": mark, "linestyle": line, "markersize": 5}
-            for ax, work in zip(pair, (seconds, rays), strict=True):
-                (handles[label],) = ax.loglog(work, error, **style)
-        pair[0].set(xlabel="seconds", ylabel="phase error / waves")
-        pair[1].set(xlabel="rays")
-        for ax, column in zip(pair, (1, 0), strict=True):
-            ax.set(xlim=[end[column] for end in shown], ylim=[end[2] for end in shown])
-            ax.grid(alpha=0.3)
-    figure.legend([handles[label] for label in labels], labels, loc="outside lower center", ncols=len(labels))
-    return figure
-
-
-def spectra(table: DataArray, columns: int = 4) -> Figure:
-    """A BRDF against wavelength and angle of observation, in the plane of incidence: a panel for each.
-
-    Parameters
-    ----------
-    table : xarray.DataArray
-        As from `goniometer.brdf` (phi taken at the first value), or `studies.study`.
-    columns : int
-        Panels side by side.
-
-    Returns
-    -------
-    matplotlib Figure
-        The scale ends at the 99.5th percentile of what is not 0.
-    """
-    from matplotlib.figure import Figure
-
-    others = [name for name in table.dims if name not in ("theta_o", "phi_o", "phi_i", "wavelength")]
-    flat = table.isel(phi_i=0, phi_o=0).stack(panel=others)
-    values = np.asarray(flat.transpose("panel", "theta_o", "wavelength"))
-    top = float(np.quantile(values[values > 0.0], 0.995)) if (values > 0.0).any() else 1.0
-    rows = -(-len(values) // columns)
-    figure = Figure(figsize=(3.2 * min(columns, len(values)) + 1.0, 2.6 * rows), layout="constrained")
-    panels = figure.subplots(rows, min(columns, len(values)), squeeze=False, sharex=True, sharey=True)
-    edges = 1e9 * np.asarray(table.wavelength), np.rad2deg(table.theta_o)
-    for ax, image, names in zip(panels.flat, values, flat.panel.values, strict=False):
-        drawn = ax.pcolormesh(*edges, image, shading="nearest", vmin=0.0, vmax=top, cmap="viridis")
-        labels = dict(zip(others, names, strict=True))
-        start = f"from {np.rad2deg(labels.pop('theta_i')):.3g}°"
-        ax.set_title(", ".join([start, *(f"{k} {_short(v)}" for k, v in labels.items())]), fontsize="small")
-    for ax in panels.flat[len(values) :]:
-        ax.set_visible(False)
-    figure.supxlabel("wavelength / nm")
-    figure.supylabel("observed at / °")
-    figure.colorbar(drawn, ax=panels, label="BRDF / sr⁻¹")
-    return figure
-
-
-def _short(value: Any) -> str:
-    """A parameter for a title: small lengths in nm."""
-    if isinstance(value, float) and 0.0 < value < 1e-3:
-        return f"{1e9 * value:g} nm"
-    return str(value) if isinstance(value, str) else f"{value:g}"
-
-
 def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> None:
     """Write a figure, or the figure of some axes; a file is there in full or not at all.
 
@@ -354,9 +246,6 @@ def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0)
         Pixels an inch.
     """
     figure: Any = drawn if hasattr(drawn, "savefig") else drawn.get_figure(root=True)
-    target = Path(path)
-    with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=target.parent) as folder:
-        part = Path(folder, target.name)
+    with whole(path) as part:
         lightly = {"pil_kwargs": {"compress_level": 1}} if part.suffix == ".png" else {}
         figure.savefig(part, dpi=dpi, **lightly)
-        os.replace(part, target)

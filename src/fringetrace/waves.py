@@ -43,6 +43,29 @@ ANGLES: dict[str, float] = {
 }
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]\S*)\s*")
 
+# What lengths are shown in.
+SHOWN: tuple[tuple[str, float], ...] = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9), ("pm", 1e-12))
+
+
+def unit_of(length: float) -> tuple[str, float]:
+    """The unit in which a length has a few digits before the point.
+
+    Parameters
+    ----------
+    length : float, metres
+
+    Returns
+    -------
+    name : str
+    metres : float
+        How long one of it is.
+    """
+    size = abs(length)
+    for name, metres in SHOWN:
+        if size >= metres:
+            return name, metres
+    return SHOWN[-1] if size > 0.0 else SHOWN[0]
+
 
 def _parse(text: str, what: str, units: dict[str, float]) -> float:
     """A number with a unit of one kind, in the SI unit."""

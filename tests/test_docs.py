@@ -1,0 +1,102 @@
+"""What README and docs say about Python: blocks marked `python run` run, all others name what there is."""
+
+import ast
+import inspect
+import re
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import fringetrace as ft
+
+ROOT = Path(__file__).resolve().parents[1]
+WRITTEN = [path for path in (ROOT / "docs").rglob("*.md") if path.parent.name in {"docs", "from"}]
+PAGES = sorted([ROOT / "README.md", *WRITTEN])
+BLOCK = re.compile(r"^```python( run)?\n(.*?)^```$", flags=re.DOTALL | re.MULTILINE)
+LINK = re.compile(r"\]\((?!https?:|#)([^)#\s]+)")
+
+
+def name(page):
+    return str(page.relative_to(ROOT))
+
+
+def blocks(page, run=False):
+    """Text of the blocks of a page: those that run, or all."""
+    return [text for mark, text in BLOCK.findall(page.read_text(encoding="utf-8")) if mark or not run]
+
+
+def imported(tree, known):
+    """Names that a block imports from the package, and those known before."""
+    known = dict(known)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fringetrace"):
+            module = import_module(node.module)
+            known |= {alias.asname or alias.name: getattr(module, alias.name) for alias in node.names}
+    return known
+
+
+def resolved(node, known):
+    """What a dotted name stands for, as far as modules and classes tell; None if that is not known."""
+    if isinstance(node, ast.Name):
+        return known.get(node.id)
+    owner = resolved(node.value, known) if isinstance(node, ast.Attribute) else None
+    return getattr(owner, node.attr) if isinstance(owner, ModuleType | type) else None
+
+
+def unknown_keywords(call, known):
+    """Keywords of a call that what is called does not have."""
+    called = resolved(call.func, known)
+    if not callable(called):
+        return set()
+    parameters = inspect.signature(called).parameters.values()
+    if any(parameter.kind is parameter.VAR_KEYWORD for parameter in parameters):
+        return set()
+    return {keyword.arg for keyword in call.keywords} - {parameter.name for parameter in parameters} - {None}
+
+
+def check(text, known):
+    """Names and keywords of a block exist; what it has imported, for the next one."""
+    tree = ast.parse(text)
+    known = imported(tree, known)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            resolved(node, known)  # AttributeError for what is not there
+        if isinstance(node, ast.Call):
+            assert unknown_keywords(node, known) == set(), ast.unparse(node)
+    return known
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page)], ids=name)
+def test_python_in_the_docs_names_what_there_is(page):
+    known = {"ft": ft}
+    for text in blocks(page):
+        known = check(text, known)
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, run=True)], ids=name)
+def test_python_in_the_docs_runs(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {}
+    for text in blocks(page, run=True):
+        exec(compile(text, name(page), "exec"), names)
+
+
+def test_a_wrong_name_is_seen():
+    with pytest.raises(AttributeError, match="no attribute 'mechelson'"):
+        check("ft.instruments.mechelson(sample)", {"ft": ft})
+    with pytest.raises(AssertionError, match="aperture_"):
+        check("ft.instruments.michelson(sample, aperture_=1)", {"ft": ft})
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "CONTRIBUTING.md"], ids=name)
+def test_links_lead_to_files(page):
+    links = LINK.findall(page.read_text(encoding="utf-8"))
+    assert links
+    assert [link for link in links if not (ROOT / link).exists()] == []
+
+
+def test_readme_has_twelve_lines_of_python():
+    (text,) = blocks(ROOT / "README.md")
+    assert len([line for line in text.splitlines() if line]) == 12
