@@ -30,8 +30,6 @@ HENE = 632.8 * nm
 MIRROR = ft.Mirror()
 # An estimate may be this much below the truth, and above it.
 BELOW, ABOVE = 0.5, 10.0
-# Points in a pixel are chosen to be off by 1e-6 of the field at most; below, estimates are only bounds.
-FLOOR = 1e-6 / (2 * math.pi)
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,6 @@ class Row:
     size: str
     truth: float
     estimate: float
-    by_points: bool = False
 
     @property
     def ratio(self) -> float:
@@ -51,7 +48,7 @@ class Row:
     @property
     def holds(self) -> bool:
         """Whether the estimate keeps its promise."""
-        return BELOW * self.truth <= self.estimate <= max(ABOVE * self.truth, FLOOR * self.by_points)
+        return BELOW * self.truth <= self.estimate <= ABOVE * self.truth
 
 
 def off(field: np.ndarray, truth: np.ndarray) -> float:
@@ -350,7 +347,7 @@ def pixels_wavefront() -> Iterator[Row]:
         cycles = math.sin(2 * tilt) * pitch / HENE
         mean = np.tile(-math.sqrt(math.cos(2 * tilt)) * np.sinc(cycles) * wave(path), (4, 1))
         field = ft.complex_field(paths, HENE, "wavefront")
-        yield Row(f"{cycles:.2g} fringes a pixel", off(field, mean), quadrature_error(paths, HENE), True)
+        yield Row(f"{cycles:.2g} fringes a pixel", off(field, mean), quadrature_error(paths, HENE))
 
 
 def terrain() -> Iterator[Row]:

@@ -148,6 +148,72 @@ def test_a_bench_can_be_built_from_any_scene(bench):
     np.testing.assert_array_equal(other.carrier(HENE), 0.0)
 
 
+# Shutters.
+
+
+@pytest.mark.parametrize(("arm", "other"), [("reference", 0), ("sample", 1)])
+def test_a_shut_arm_leaves_the_light_of_the_other_as_it_is(rays, arm, other):
+    shut = rays.shut(arm)
+    assert type(shut) is Bench
+    assert shut.derived == {}
+    # the same paths, to the bit, and the same light
+    mine = rays.trace().visits(2) == other
+    for column in ("ray", "length", "origin", "direction", "amplitude", "key"):
+        np.testing.assert_array_equal(
+            getattr(shut.trace().detected, column), getattr(rays.trace().where(mine).detected, column)
+        )
+    one = shut.fields(HENE)
+    np.testing.assert_array_equal(one[other], rays.fields(HENE)[other])
+    assert np.abs(one[other]).min() > 0.3
+    np.testing.assert_array_equal(one[1 - other], 0.0)
+    alone = np.abs(rays.fields(HENE)[other]) ** 2
+    np.testing.assert_allclose(shut.interferogram(HENE), alone, rtol=1e-14)
+    # steps move light that is not there, or all of it
+    frames = shut.phase_steps(HENE)
+    np.testing.assert_allclose(frames, np.broadcast_to(alone, frames.shape), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("arm", "other"), [("reference", 0), ("sample", 1)])
+def test_by_the_wavefront_it_is_sampled_for_what_is_left(bench, arm, other):
+    np.testing.assert_allclose(
+        bench.shut(arm).mutual(HENE)[other, other], bench.mutual(HENE)[other, other], rtol=QUADRATURE
+    )
+    fields = bench.shut(arm).fields(HENE), bench.fields(HENE)
+    np.testing.assert_allclose(fields[0][other], fields[1][other], atol=QUADRATURE)
+
+
+def test_light_of_a_shut_arm_ends_at_the_shutter(bench):
+    for arm in ("sample", "reference"):
+        paths = bench.shut(arm).trace()
+        ended = paths.fate == ft.Fate.ABSORBED
+        np.testing.assert_array_equal(paths.bounces[ended], 2)  # the splitter, the shutter
+        assert ended.sum() == np.prod(bench.beam.shape)
+        assert len(paths) < len(bench.trace())
+        assert len(bench.shut(arm).trace().detected) == np.prod(bench.beam.shape)
+    with pytest.raises(ValueError, match="height: expected pixels with light from both arms, got none"):
+        bench.shut("reference").height(HENE)
+
+
+def test_a_fizeau_is_blocked_at_its_sample():
+    """What is left is what the reference face sends back."""
+    one = instruments.fizeau(plate(8 * mm, 8 * mm), aperture=6 * mm, gap=1 * mm, pixels=(6, 8))
+    alone = one.shut("sample").fields(HENE)
+    np.testing.assert_array_equal(alone[0], one.fields(HENE)[0])
+    np.testing.assert_array_equal(alone[1:], 0.0)
+    with pytest.raises(
+        ValueError, match="shut: expected an arm that light of the other does not pass, got 'r"
+    ):
+        one.shut("reference")
+
+
+def test_arms_that_there_are_not_are_refused(bench):
+    with pytest.raises(ValueError, match="shut: expected 'reference' or 'sample', got 'source'"):
+        bench.shut("source")
+    loose = Bench(bench.scene, bench.beam, bench.ccd, reference=bench.reference)
+    with pytest.raises(ValueError, match=r"shut: expected an arm .*, got 'sample'"):
+        loose.shut("sample")
+
+
 def test_everything_labelled(rays, tmp_path):
     data = rays.dataset(HENE)
     np.testing.assert_array_equal(data.interferogram, rays.interferogram(HENE))

@@ -1,7 +1,7 @@
 """The budget as a whole: its terms, its text, what it refuses, and where a bench gives it."""
 
 import math
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -124,6 +124,17 @@ def test_the_same_rays_again_are_the_same(bench):
     seen, same = paths.detected, twin.detected
     np.testing.assert_array_equal(seen.length, same.length)
     np.testing.assert_array_equal(seen.key, same.key)
+
+
+@pytest.mark.parametrize(("faintest", "waves"), [(0.1, 1), (1e-3, 2)])
+def test_light_as_faint_is_followed_again(faintest, waves):
+    """A sample that sends back a hundredth of an amplitude."""
+    faint = ft.Surface(shapes.plate(8 * mm, 8 * mm), ft.Mirror(1e-4), "sample")
+    one = replace(instruments.michelson(faint, aperture=6 * mm, pixels=(4, 4)), min_amplitude=faintest)
+    twin = again(one.trace(), one.beam.shape)
+    assert twin.min_amplitude == faintest
+    assert len(np.unique(twin.detected.key)) == waves
+    np.testing.assert_array_equal(one.trace().detected.key, twin.detected.key)
 
 
 @pytest.mark.parametrize(

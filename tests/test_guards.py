@@ -193,6 +193,76 @@ def test_loose_rays_have_no_folds():
     assert guards.folded(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)]))) is None
 
 
+# Foci and cusps.
+
+
+def place_told(text):
+    number_, row, column = re.search(
+        r"about ([\d,]+) of its rays, the first at pixel \[(\d+), (\d+)\]", text
+    ).groups()
+    return number(number_), int(row), int(column)
+
+
+@pytest.mark.parametrize("rays", [60, 61])
+def test_the_line_of_the_cusp_is_told(rays):
+    """On the plane z = R / 2 rays arrive at x = R t^3, to lowest order, by 11 rows of the beam."""
+    text = guards.focused(hollow(150 * um, rays), HENE)
+    count, _, column = place_told(text)
+    assert text.startswith("a wave comes to a focus or a cusp on the CCD: ")
+    assert count == 11 * (1 + (rays == 60))
+    assert column in (29, 30)
+
+
+@pytest.mark.parametrize("place", [20, 140, 149, 151, 160, 240])
+def test_folds_and_what_is_before_them_are_not(place):
+    """The wavefront method knows folds in their uniform form."""
+    assert guards.focused(hollow(place * um), HENE) is None
+
+
+def test_a_cusp_is_told_by_its_place():
+    """A plane across the line of cusps, z = R / 2 + y / 4: the folds meet in the middle of the image."""
+    beam = ft.Beam((0, 0, 0), (0, 0, 1), (0, 1, 0), (300 * um, 60 * um), (16, 62))
+    ccd = ft.CCD((0, 0, 150 * um), (0, -0.25, 1), (0, 1, 0), 5 * um, (16, 60))
+    paths = arrivals.reflected(beam, ccd, arrivals.cylinder(300 * um)).detected
+    count, row, column = place_told(guards.focused(paths, HENE))
+    assert count <= 6
+    assert abs(row - 8) <= 1
+    assert abs(column - 30) <= 1
+
+
+@pytest.mark.parametrize("place", [45, 49.9, 50.1])
+def test_a_point_focus_is_told_and_what_is_beside_it_is_not(place):
+    def seen(z):
+        beam = ft.Beam((0, 0, 30 * mm), (0, 0, -1), (0, 1, 0), (5 * mm, 5 * mm), (20, 20))
+        ccd = ft.CCD((0, 0, z), (0, 0, -1), (0, 1, 0), 0.1 * mm, (64, 64))
+        return arrivals.reflected(beam, ccd, arrivals.paraboloid(50 * mm))
+
+    guards.check(seen(place * mm), HENE, "wavefront")
+    with pytest.warns(
+        FringetraceWarning, match=r"focus or a cusp on the CCD: about 400 of its rays, .* \[3[12], "
+    ):
+        guards.check(seen(50 * mm), HENE, "wavefront")
+
+
+def test_light_through_the_axis_of_a_sphere_is_told():
+    """A ring of its rays meets in one point, for R / 2 < z < R / (2 cos t)."""
+    sphere = ft.Surface(
+        shapes.icosphere(1 * mm, 4), ft.Mirror(), "ball", form=ft.forms.Sphere((0, 0, 0), 1 * mm)
+    )
+    beam = ft.Beam((0, 0, 0.3 * mm), (0, 0, 1), (0, 1, 0), (0.8 * mm, 0.8 * mm), (30, 30))
+    for place, told in ((0.3, False), (0.52, True), (0.8, False)):
+        ccd = ft.CCD((0, 0, 0), (0, 0, 1), (0, 1, 0), 10 * um, (200, 200), focus=place * mm)
+        paths = ft.trace(ft.Scene([sphere]), beam, ccd)
+        assert len(paths.detected) > 880
+        assert (guards.focused(paths.detected, HENE) is not None) == told
+
+
+def test_flat_facets_and_loose_rays_have_no_foci():
+    assert guards.focused(bench(0.1).trace().detected, HENE) is None
+    paths = hollow(150 * um)
+    assert guards.focused(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE) is None
+
+
 # Costly facets.
 
 
@@ -242,6 +312,19 @@ def test_each_is_told_once():
     assert [str(warning.message)[:13] for warning in told] == ["fringes alias"]
     # at the line that asked for it
     assert told[0].filename == __file__
+
+
+def test_all_there_is_to_say_of_an_image_comes_at_once():
+    """A hollow of a few facets, and fringes too fine: the budget, and a note of each."""
+    along = np.linspace(-6 * mm, 6 * mm, 13)
+    mesh = shapes.height_map(-(along**2 + along[:, None] ** 2) / 10.0, 1 * mm)
+    bad = bench(0.8, pixels=(48, 48), sample=mesh)
+    costs, notes = guards.judged(bad.trace(), HENE, "rays")
+    assert costs == ft.budget(bad.trace(), HENE, "rays")
+    assert [note[:12] for note in notes] == ["fringes alia", "facets cost "]
+    assert notes[:1] == guards.found(bad.trace(), HENE, "rays")
+    good = bench(0.1)
+    assert guards.judged(good.trace(), HENE)[1] == []
 
 
 def test_an_image_without_light_has_nothing_to_tell():

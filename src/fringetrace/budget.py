@@ -136,14 +136,15 @@ def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
     Returns
     -------
     Paths
-        Followed for as many bounces as any path of `paths` that reached the CCD.
+        Followed for as many bounces as any path of `paths` that reached the CCD, and as faint.
     """
     assert isinstance(paths.source, Beam)
     bounces = int(paths.bounces[paths.fate == Fate.DETECTED].max(initial=0))
     beam = replace(paths.source, shape=shape)
     return trace(
-        paths.scene, beam, paths.ccd, wavelength=paths.wavelength, max_bounces=bounces, record=record
-    )
+        paths.scene, beam, paths.ccd, wavelength=paths.wavelength, max_bounces=bounces,
+        min_amplitude=paths.min_amplitude, record=record,
+    )  # fmt: skip
 
 
 def _shape(paths: Paths) -> tuple[int, int]:

@@ -137,7 +137,7 @@ def fizeau(
     ccd = CCD(centre=arm * z, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels, focus=focus)
     return Bench(
         scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, mark=Mark(2, then=1, sense=-1),
-        immersion=as_material(between), max_bounces=max_bounces, min_amplitude=min_amplitude,
+        sample=1, immersion=as_material(between), max_bounces=max_bounces, min_amplitude=min_amplitude,
     )  # fmt: skip
 
 

@@ -24,6 +24,9 @@ FEW = 0.01
 ENOUGH = 4
 # Path keys that are looked at one by one: those with the most rays.
 KEYS = 8
+# A wave is at its focus where a ray tube's area, between its neighbours, touches this part of theirs, or
+# where it has become so narrow as a part of the beam, and as narrow as diffraction lets it.
+TOUCH, NARROW = 0.1, 0.1
 
 
 class FringetraceWarning(UserWarning):
@@ -31,7 +34,9 @@ class FringetraceWarning(UserWarning):
 
 
 def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
-    """What there is to warn of: contradicting media, aliased fringes; for ray sums starved pixels and folds.
+    """What there is to warn of: contradicting media, aliased fringes; starved pixels and folds of ray sums.
+
+    Of the wavefront method, foci and cusps on the CCD.
 
     Parameters
     ----------
@@ -55,6 +60,8 @@ def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
     texts = [contradicted(paths), aliased(seen, wavelength)]
     if chosen(paths, method) == "rays":
         texts += [starved(seen), folded(seen)]
+    else:
+        texts.append(focused(seen, wavelength))
     return [text for text in texts if text is not None]
 
 
@@ -248,6 +255,42 @@ def folded(paths: Paths) -> str | None:
     )
 
 
+def focused(paths: Paths, wavelength: float) -> str | None:
+    """Whether a wave comes to a point, a line or a cusp on the CCD, where the light of rays is infinite.
+
+    A fold alone is none: the wavefront method knows its uniform form. Looked for in waves off forms.
+
+    Parameters
+    ----------
+    paths : Paths
+        Detected.
+    wavelength : float, metres
+
+    Returns
+    -------
+    str or None
+    """
+    if not isinstance(paths.source, Beam):
+        return None
+    number, where = 0, None
+    for some in _commonest(paths):
+        wave = paths.where(np.isin(np.arange(len(paths)), some))
+        if not _smooth(wave):
+            continue
+        pixel = _grid(wave.ray, wave.pixel, paths.source.shape)
+        singular = np.isfinite(pixel[..., 0]) if _narrowest(wave, wavelength) else _pinched(pixel)
+        number += int(singular.sum())
+        if where is None and singular.any():
+            where = np.floor(pixel[tuple(np.argwhere(singular)[0])]).astype(int)
+    if where is None:
+        return None
+    return (
+        f"a wave comes to a focus or a cusp on the CCD: about {number:,} of its rays, the first at pixel "
+        f"[{where[0]}, {where[1]}]; the light of rays is infinite there: take pixels away from it, or look "
+        "at a plane before or beyond it"
+    )
+
+
 def costly(budget: Budget) -> str | None:
     """Whether facets cost more than a twentieth of a wave.
 
@@ -298,9 +341,7 @@ def _between(bright: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 def _turned(ray: Array, pixel: FloatArray, shape: tuple[int, int]) -> tuple[Array, Array, FloatArray]:
     """Of each cell of four rays: whether it arrives turned over, whether all four do arrive, and where."""
-    place = np.full((shape[0] * shape[1], 2), np.nan)
-    place[ray] = pixel
-    grid = place.reshape(*shape, 2)
+    grid = _grid(ray, pixel, shape)
     along = grid[:-1, 1:] - grid[:-1, :-1]
     up = grid[1:, :-1] - grid[:-1, :-1]
     area = along[..., 0] * up[..., 1] - along[..., 1] * up[..., 0]
@@ -313,3 +354,77 @@ def _broad(mask: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     square = mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]
     padded = np.pad(square, 1)
     return np.asarray(padded[:-1, :-1] | padded[1:, :-1] | padded[:-1, 1:] | padded[1:, 1:])
+
+
+def _grid(ray: Array, pixel: FloatArray, shape: tuple[int, int]) -> FloatArray:
+    """Where the rays of a beam arrive, (rows, columns, 2); NaN where they do not."""
+    place = np.full((shape[0] * shape[1], 2), np.nan)
+    place[ray] = pixel
+    return place.reshape(*shape, 2)
+
+
+def _smooth(wave: Paths) -> bool:
+    """Whether paths of one key met a surface with a form, or come from none that has facets."""
+    if wave.points is not None and wave.triangle is None:
+        return True
+    formed = [number for number, surface in enumerate(wave.scene.surfaces) if surface.form is not None]
+    return any(wave.visits(number)[0] for number in formed)
+
+
+def _narrowest(wave: Paths, wavelength: float) -> bool:
+    """Whether light has narrowed, either way, to what diffraction leaves of it: width times aperture."""
+    assert isinstance(wave.source, Beam)
+    size = max(wave.source.size)
+    for axis in _ccd(wave).axes[:2]:
+        width, aperture = np.ptp(wave.origin @ axis), np.ptp(wave.gradient @ axis)
+        if width < NARROW * size and width * aperture < wavelength < size * aperture:
+            return True
+    return False
+
+
+def _pinched(pixel: FloatArray) -> npt.NDArray[np.bool_]:
+    """Nodes of a beam's grid about which its map to the CCD is more singular than on a fold.
+
+    The area of ray tubes is 0 without changing its sign, or changes it along the line on which it is 0:
+    there that line and the direction in which tubes close are one (Whitney's cusp).
+    """
+    along, up = _differences(pixel, 1), _differences(pixel, 0)
+    area = along[..., 0] * up[..., 1] - along[..., 1] * up[..., 0]
+    found = np.zeros(area.shape, dtype=np.bool_)
+    for axis in (0, 1):
+        before, after = np.roll(area, 1, axis), np.roll(area, -1, axis)
+        sign, low = np.sign(before), np.minimum(np.abs(before), np.abs(after))
+        between = (np.sign(after) == sign) & (np.abs(area) <= low)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            least = area - (after - before) ** 2 / (8.0 * (after - 2.0 * area + before))
+        found |= between & (sign * least < TOUCH * np.maximum(np.abs(before), np.abs(after)))
+    return found | _cusps(area, along, up)
+
+
+def _cusps(area: FloatArray, along: FloatArray, up: FloatArray) -> npt.NDArray[np.bool_]:
+    """Nodes at whose cell the area changes sign, and its slope along the direction that closes, too."""
+    slope_up, slope_along = np.gradient(area)
+    # columns of the adjugate: where the area is 0 both lie along the direction that closes
+    closes = [up[..., k] * slope_along - along[..., k] * slope_up for k in (0, 1)]
+    weight = [along[..., k] ** 2 + up[..., k] ** 2 for k in (0, 1)]
+    found = np.zeros(area.shape, dtype=np.bool_)
+    first = _corners(weight[0]).sum(axis=0) > _corners(weight[1]).sum(axis=0)
+    slope = np.where(first, _corners(closes[0]), _corners(closes[1]))
+    corner = _corners(area)
+    both = (corner.min(axis=0) < 0.0) & (corner.max(axis=0) > 0.0)
+    found[:-1, :-1] = both & (slope.min(axis=0) < 0.0) & (slope.max(axis=0) > 0.0)
+    return found
+
+
+def _corners(values: Array) -> Array:
+    """(4, rows - 1, columns - 1): values at the corners of cells."""
+    return np.stack([values[:-1, :-1], values[1:, :-1], values[:-1, 1:], values[1:, 1:]])
+
+
+def _differences(values: FloatArray, axis: int) -> FloatArray:
+    """Differences of fourth order from node to node; NaN at the rim."""
+    beside, next_ = (np.roll(values, -n, axis) - np.roll(values, n, axis) for n in (1, 2))
+    slope = (8.0 * beside - next_) / 12.0
+    rows = np.arange(values.shape[axis])
+    rim = (rows < 2) | (rows >= len(rows) - 2)
+    return np.where(np.expand_dims(rim, tuple(k for k in range(3) if k != axis)), np.nan, slope)

@@ -143,7 +143,7 @@ def michelson(
         centre=arm * z, normal=-z, up=y, pitch=aperture / columns, shape=(rows, columns),
         focus=2.0 * arm if focus else 0.0,
     )  # fmt: skip
-    return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt, method=method)
+    return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, sample=1)
 
 
 def _arm(size: tuple[float, float], arm: float | None, top: float, thick: SplitterPlate | None) -> float:

@@ -111,6 +111,8 @@ class Paths:
         How often rays came to a boundary in another medium than it has on that side.
     scene, source, ccd
         What was traced.
+    min_amplitude : float
+        Branches below this part of the launched amplitude were not followed.
     """
 
     ray: npt.NDArray[np.int64]
@@ -142,6 +144,7 @@ class Paths:
     dropped: FloatArray | None = None
     bend: FloatArray | None = None
     contradictions: npt.NDArray[np.int64] | None = None
+    min_amplitude: float = 1e-6
 
     def __len__(self) -> int:
         return len(self.ray)

@@ -67,14 +67,15 @@ def gauss_table(orders: Array) -> tuple[FloatArray, FloatArray]:
     Parameters
     ----------
     orders : int64, any shape
-        Which rules are wanted, up to `MOST`.
+        Which rules are wanted.
 
     Returns
     -------
-    nodes, weights : (MOST + 1, MOST) float64
-        Row n is the rule of n points; 0 where it is not wanted.
+    nodes, weights : (n + 1, n) float64
+        n is the largest of `orders`. Row m is the rule of m points; 0 where it is not wanted.
     """
-    nodes, weights = np.zeros((MOST + 1, MOST)), np.zeros((MOST + 1, MOST))
+    most = int(orders.max(initial=1))
+    nodes, weights = np.zeros((most + 1, most)), np.zeros((most + 1, most))
     for n in np.flatnonzero(np.bincount(orders.ravel(), minlength=1)[1:]) + 1:
         at, weight = np.polynomial.legendre.leggauss(n)
         nodes[n, :n], weights[n, :n] = 0.5 + 0.5 * at, 0.5 * weight
@@ -254,13 +255,18 @@ def fringes(slope: FloatArray, carrier: bool) -> FloatArray:
 
 
 def averaged(
-    shape: tuple[int, int], light: Light, period: float, carrier: bool, cuts: Edges | None = None
+    shape: tuple[int, int],
+    light: Light,
+    period: float,
+    carrier: bool,
+    cuts: Edges | None = None,
+    more: int = 0,
 ) -> tuple[ComplexArray, ComplexArray]:
     """Means over the pixels of the fields of some groups, and of their products.
 
     Where light is even its value at the centre will do, with a quarter of a quarter of its curvature:
     the mean of f over a pixel is f + (f_xx + f_yy) / 24 to fourth order (Euler and Maclaurin).
-    Elsewhere there are as many sample points as the fringes ask for.
+    Elsewhere there are as many sample points as the fringes ask for, or what bends as they do.
 
     Parameters
     ----------
@@ -274,6 +280,8 @@ def averaged(
         Whether the mean fields matter: else only fringes between waves are resolved.
     cuts : Edges, optional
         Edges of sheets.
+    more : int
+        Points along either axis beyond those asked for, in every pixel: to see what they are worth.
 
     Returns
     -------
@@ -285,13 +293,16 @@ def averaged(
     centre, slope = _centres(shape, light)
     product = mutual_products(centre)
     cycles = fringes(slope, carrier) / period
-    bend = _curvature(product)
-    even = (cycles <= GENTLE) & ~_cut(shape, cuts) & _small(bend, product)
+    bend, cut = _curvature(product), _cut(shape, cuts)
+    even = (cycles <= GENTLE) & ~cut & _small(bend, product)
     if carrier:
         bent = _curvature(centre)
         even &= _small(bent, centre)
         centre += bent
-    order = np.where(even, 0, gauss_order(cycles))
+    if more:
+        even[:] = False
+    cycles = np.maximum(cycles, np.where(cut, 0.0, _swing(bend, product)))
+    order = np.where(even, 0, gauss_order(cycles) + more)
     mean, mutual = _sampled(order, light, cuts)
     np.copyto(mean, centre, where=even)
     np.copyto(mutual, product + bend, where=even)
@@ -330,6 +341,13 @@ def _small(bend: ComplexArray, values: ComplexArray) -> npt.NDArray[np.bool_]:
     small = np.zeros(values.shape, dtype=np.bool_)
     small[1:-1, 1:-1] = (_around(bend) <= BENT * _around(values))[1:-1, 1:-1]
     return small
+
+
+def _swing(bend: ComplexArray, values: ComplexArray) -> FloatArray:
+    """Cycles a pixel of a cosine that bends as much: (2 pi c)^2 / 24 of the largest value around."""
+    bend, values = (np.abs(f).reshape(-1, *f.shape[-2:]).max(axis=0) for f in (bend, values))
+    part = np.divide(bend, values := _around(values), out=np.zeros_like(values), where=values > 0.0)
+    return np.asarray(np.sqrt(24.0 * _around(part)) / (2.0 * np.pi), dtype=np.float64)
 
 
 def _cut(shape: tuple[int, int], cuts: Edges | None) -> npt.NDArray[np.bool_]:

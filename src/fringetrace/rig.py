@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.arms import Mark
 from fringetrace.field import chosen, complex_field, mutual_intensity, products
+from fringetrace.interfaces import Absorber
 from fringetrace.lines import Line, Spectrum
 from fringetrace.media import at_wavelength, needs
 from fringetrace.paths import Paths
@@ -52,6 +53,8 @@ class Rig:
     max_bounces : int
     min_amplitude : float
         See `trace`.
+    sample : int, optional
+        Number of a surface that all light of the sample's arm, and of no other, meets; see `shut`.
     """
 
     scene: Scene
@@ -64,6 +67,7 @@ class Rig:
     immersion: Material | None = None
     max_bounces: int = 12
     min_amplitude: float = 1e-6
+    sample: int | None = None
     # the paths once traced, at which wavelengths, and the light of the last one
     derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -114,6 +118,37 @@ class Rig:
             self.derived["traced"] = [*self.traced, at]
         self.derived["served"] = served
         return served
+
+    def shut(self, arm: str) -> Self:
+        """The same bench with a black shutter in one arm: its light ends there and is not traced on.
+
+        Parameters
+        ----------
+        arm : {"reference", "sample"}
+
+        Returns
+        -------
+        Rig
+            Of its own, not traced yet. What reaches the CCD does so to the bit as with both arms open.
+
+        Raises
+        ------
+        ValueError
+            For another arm, or one that shares its surfaces with the other.
+        """
+        arms = {
+            # marked light parts from the rest where both meet
+            "reference": self.reference if self.mark is None else None,
+            "sample": self.sample,
+        }
+        if arm not in arms:
+            raise ValueError(f"shut: expected {' or '.join(map(repr, arms))}, got {arm!r}")
+        blocked = arms[arm]
+        if blocked is None:
+            raise ValueError(f"shut: expected an arm that light of the other does not pass, got {arm!r}")
+        surfaces = list(self.scene.surfaces)
+        surfaces[blocked] = replace(surfaces[blocked], interface=Absorber(), front=None, back=None)
+        return replace(self, scene=replace(self.scene, surfaces=tuple(surfaces)))
 
     def sampled(self, shape: tuple[int, int], wavelength: float | None = None) -> Paths:
         """Paths of a coarser grid of rays over the same beam, with their polylines, to look at.

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace import wavefront
 from fringetrace.field import complex_field
 from fringetrace.paths import Paths, pixels
 from fringetrace.scene import CCD, Beam
@@ -20,6 +21,8 @@ BANDS = (0.1, 0.5, 0.9)
 ROWS = 4
 # Pixel rows in each band for the ray sum, which has more to average.
 MANY = 24
+# Points a pixel, along either axis, that are more than enough: each makes the error many times less.
+MORE = 4
 # By halving the ray spacing an error falls as it is seen to, but no less than by 3 nor more than by 2^4.
 LEAST_FALL, MOST_FALL = 3.0, 16.0
 
@@ -98,7 +101,7 @@ def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0
 
 
 def quadrature_error(paths: Paths, wavelength: float) -> float:
-    """What the points in each pixel cost the wavefront method: four pixels in the place of one.
+    """What the points in each pixel cost the wavefront method: some more of them along either axis.
 
     Parameters
     ----------
@@ -110,13 +113,15 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
     float, waves; see `budget.Budget`
     """
     assert paths.ccd is not None
-    fields, finer = [], []
+    fields: list[ComplexArray] = []
+    finer: list[ComplexArray] = []
+    groups = np.zeros(len(paths), dtype=np.int64)
+    axes = (None,) if paths.field is None else paths.ccd.axes
     for ccd in bands(paths.ccd):
-        rows, columns = ccd.shape
-        fine = replace(ccd, pitch=0.5 * ccd.pitch, shape=(2 * rows, 2 * columns))
-        fields.append(complex_field(replace(paths, ccd=ccd), wavelength, "wavefront"))
-        image = complex_field(replace(paths, ccd=fine), wavelength, "wavefront")
-        finer.append(image.reshape(*image.shape[:-2], rows, 2, columns, 2).mean(axis=(-3, -1)))
+        for axis in axes:
+            light = [wavefront.light(replace(paths, ccd=ccd), groups, axis=axis)]
+            for images, more in ((fields, 0), (finer, MORE)):
+                images.append(wavefront.fields(light, 1, ccd.shape, wavelength, True, more)[0])
     return _difference(fields, finer)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -132,6 +133,7 @@ def _paths(
         source=plan.source,
         ccd=plan.ccd,
         contradictions=contradictions,
+        min_amplitude=math.sqrt(plan.faint),
         **extra,
     )
 

@@ -94,7 +94,7 @@ def light(
 
 
 def fields(
-    lights: list[Light], groups: int, shape: tuple[int, int], period: float, carrier: bool
+    lights: list[Light], groups: int, shape: tuple[int, int], period: float, carrier: bool, more: int = 0
 ) -> tuple[ComplexArray, ComplexArray]:
     """Means over each pixel of the fields of groups of sheets, and of their products.
 
@@ -111,6 +111,8 @@ def fields(
     carrier : bool
         Whether the mean fields matter: then pixels are sampled for the whole slope of the phase;
         otherwise for the differences between the sheets that overlap.
+    more : int
+        See `quadrature.averaged`.
 
     Returns
     -------
@@ -142,4 +144,4 @@ def fields(
         return field
 
     segments = np.concatenate([beam.segments for beam in lights])
-    return averaged(shape, at, period, carrier, edges(segments, shape))
+    return averaged(shape, at, period, carrier, edges(segments, shape), more)

@@ -122,7 +122,9 @@ def mach_zehnder(
     ccd = CCD(
         centre=chip * z, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels, focus=chip - plane,
     )  # fmt: skip
-    return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, immersion=scene.medium)
+    return Bench(
+        scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, immersion=scene.medium, sample=1
+    )
 
 
 def _turn(tilt: tuple[float, float]) -> FloatArray:
