@@ -252,3 +252,32 @@ def test_polarised_tables_are_not_filled_in():
         brdf(mirror(), [0.0], Cones([0.0], 0.01), WAVES, polarisation="s", reciprocal=True)
     with pytest.raises(ValueError, match="expected one state of light, got 'unpolarised'"):
         amplitudes(mirror(), 0.0, Cones([0.0], 0.01), WAVES, polarisation="unpolarised")
+
+
+def test_half_the_rays_tell_what_the_rays_cost(rods):
+    """Powers of a few hundred rays beside those of many: the estimate is no less than half the true error."""
+    given = {"method": "power", "polarisation": None}
+    detector = Cells(6, 8)
+    truth = brdf(rods, THETA, detector, WAVES, rays=(1, 12000), **given).isel(theta_i=1, phi_i=0)
+    for count in (60, 200):
+        table = brdf(rods, THETA, detector, WAVES, rays=(1, count), **given)
+        told = goniometer.sampling_error(table, rods, detector, rays=(1, count), **given)
+        off = table.isel(theta_i=1, phi_i=0) - truth
+        true = float(np.sqrt((off**2).mean() / (truth**2).mean()))
+        assert 0.5 * true < told < 10.0 * true
+    flat = brdf(mirror(), THETA, Cones(THETA, 0.02), WAVES, rays=(4, 4))
+    assert goniometer.sampling_error(flat, mirror(), Cones(THETA, 0.02), rays=(4, 4)) < 1e-12
+    nothing = Cones(THETA + 1.0, 0.02)  # no light goes there
+    dark = brdf(mirror(), THETA, nothing, WAVES, rays=(4, 4))
+    assert goniometer.sampling_error(dark, mirror(), nothing, rays=(4, 4)) == 0.0
+
+
+def test_rounding_of_what_leaves_is_known_in_waves(rods):
+    """Some roundings of micrometres, in waves: as many more of a shorter one."""
+    long, short = (goniometer.rounding_error(rods, 0.2, wave) for wave in (600 * nm, 300 * nm))
+    assert short == pytest.approx(2 * long, rel=1e-9)
+    assert 1e-17 < long < 1e-12
+    away = goniometer.rounding_error(
+        mirror(), 0.2, 600 * nm, centre=(1.0, 0.0, 0.0), aperture=(3 * um, 3 * um)
+    )
+    assert away == 0.0  # all light misses it

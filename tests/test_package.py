@@ -51,6 +51,7 @@ def room_map():
         ".instruments",
         ".goniometer",
         ".commands",
+        ".reflectances",
         ".spectra",
         ".bsdf",
     ],

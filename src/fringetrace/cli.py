@@ -15,7 +15,7 @@ import numpy as np
 from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
-from fringetrace import commands
+from fringetrace import commands, reflectances
 from fringetrace.mesh import Mesh
 from fringetrace.waves import Array, FloatArray, checked_wavelength, parse_angle, parse_length, unit_of
 
@@ -32,8 +32,8 @@ app = App(
     help="Triangle meshes to full-field interferograms, with a phase you can trust.",
     default_parameter=Parameter(consume_multiple=True, negative_iterable=()),
 )
-app.command(commands.brdf)
-app.command(commands.lattice)
+app.command(reflectances.brdf)
+app.command(reflectances.lattice)
 app.command(commands.run)
 app.command(commands.init)
 app.command(commands.view)

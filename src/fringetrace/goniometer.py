@@ -9,13 +9,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from fringetrace.budget import hit_error
 from fringetrace.detectors import Cells, Cones, Detector, Pixels, checked_angles
 from fringetrace.farfield import FATES, Far, far_field, mean
 from fringetrace.guards import FringetraceWarning
 from fringetrace.illumination import Polarisation, Setup, Source, footprint, states, worth
+from fringetrace.media import needs
 from fringetrace.nufft import checked_wavelengths
+from fringetrace.paths import Fate
 from fringetrace.scene import Scene
 from fringetrace.tables import array
+from fringetrace.trace import trace
 from fringetrace.waves import FloatArray
 
 if TYPE_CHECKING:
@@ -31,8 +35,12 @@ __all__ = [
     "far_field",
     "footprint",
     "reciprocity",
+    "rounding_error",
+    "sampling_error",
 ]
 
+# Rays along y and x, unless asked for others; and those that are followed in longer numbers.
+RAYS, PROBES = (256, 256), 1009
 METHODS = ("rays", "diffraction", "power")
 AXES = ("theta_i", "phi_i", "theta_o", "phi_o", "wavelength")
 
@@ -104,7 +112,7 @@ def amplitudes(
     *,
     method: str = "rays",
     aperture: tuple[float, float] | None = None,
-    rays: tuple[int, int] = (256, 256),
+    rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
     source: Source | None = None,
     polarisation: Polarisation = None,
@@ -158,7 +166,7 @@ def brdf(
     *,
     method: str = "rays",
     aperture: tuple[float, float] | None = None,
-    rays: tuple[int, int] = (256, 256),
+    rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
     source: Source | None = None,
     polarisation: Polarisation = None,
@@ -323,3 +331,56 @@ def reciprocity(table: DataArray) -> float:
     other = values.transpose(2, 3, 0, 1, 4)
     top = float(np.abs(values).max())
     return float(np.abs(values - other).max()) / top if top else 0.0
+
+
+def sampling_error(table: DataArray, scene: Scene, detector: Detector, **options: Any) -> float:
+    """How far a BRDF changes if half the rays are taken either way, at the middle one of its incidences.
+
+    Where rays are many enough for what they sample, it is at least what the table is off.
+
+    Parameters
+    ----------
+    table : xarray.DataArray
+        From `brdf`, its light from phi_i[0] at least.
+    scene, detector, options
+        As given to `brdf`, with one polarisation for all incidences.
+
+    Returns
+    -------
+    float
+        Root mean square of the difference, relative to that of the table there.
+    """
+    there = table.isel(theta_i=[len(table.theta_i) // 2], phi_i=[0])
+    rows, columns = options.get("rays", RAYS)
+    fewer = max(1, rows // 2), max(1, columns // 2)
+    incidence = there.theta_i.values, there.phi_i.values
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FringetraceWarning)  # of rays too far apart: so they are meant to be
+        again = brdf(scene, incidence, detector, table.wavelength.values, **options | {"rays": fewer})
+    size = float(np.sqrt((there.values**2).mean()))
+    return float(np.sqrt(((again.values - there.values) ** 2).mean())) / size if size > 0.0 else 0.0
+
+
+def rounding_error(scene: Scene, theta: float, wavelength: float, **options: Any) -> float:
+    """What rounding in float64 costs the light that leaves a sample, see `budget.hit_error`.
+
+    Parameters
+    ----------
+    scene : Scene
+    theta : float, radians
+        Where light comes from.
+    wavelength : float, metres
+    options
+        aperture, centre, source, max_bounces, min_amplitude, as for `brdf`.
+
+    Returns
+    -------
+    float, waves, rms over the power
+    """
+    known = {name: options[name] for name in ("aperture", "centre", "source") if name in options}
+    limits = {"max_bounces": 100, "min_amplitude": 1e-6}
+    limits |= {name: options[name] for name in limits if name in options}
+    setup = Setup(scene, rays=(1, PROBES), **known)
+    at = None if needs(scene) is None else wavelength
+    paths = trace(scene, setup.light(theta, 0.0), wavelength=at, record=True, **limits)
+    return hit_error(paths.where((paths.fate == Fate.LEFT) & (paths.bounces > 0)), wavelength)

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 
 Polarised = Polarisation | Literal["unpolarised"]
+# Surfaces that light may meet, and the least amplitude of a branch.
+BOUNCES, FAINT = 100, 1e-3
 # Materials by name and by index at the wavelengths: names alone do not tell them apart.
 Media = Mapping[tuple[str | None, bytes], "Material"]
 # The field along the rods, as the goniometer says it; s light has the amplitudes of one number a ray.
@@ -200,8 +202,8 @@ def study(
     method: str = "rays",
     polarisation: Polarised = "E",
     rays: int = 2000,
-    max_bounces: int = 100,
-    min_amplitude: float = 1e-3,
+    max_bounces: int = BOUNCES,
+    min_amplitude: float = FAINT,
     folder: str | os.PathLike[str] | None = None,
     **sweeping: Any,
 ) -> DataArray:
