@@ -378,7 +378,7 @@ def rounding_error(scene: Scene, theta: float, wavelength: float, **options: Any
     float, waves, rms over the power
     """
     known = {name: options[name] for name in ("aperture", "centre", "source") if name in options}
-    limits = {"max_bounces": 100, "min_amplitude": 1e-6}
+    limits: dict[str, Any] = {"max_bounces": 100, "min_amplitude": 1e-6}
     limits |= {name: options[name] for name in limits if name in options}
     setup = Setup(scene, rays=(1, PROBES), **known)
     at = None if needs(scene) is None else wavelength

@@ -11,7 +11,7 @@ import numpy as np
 from fringetrace.waves import FloatArray, degree, parse_angle, parse_length
 
 if TYPE_CHECKING:
-    from fringetrace.goniometer import Detector
+    from fringetrace.detectors import Detector
     from fringetrace.mesh import Mesh
     from fringetrace.rods import Lattice
     from fringetrace.scene import Scene
