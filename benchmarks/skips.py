@@ -399,11 +399,31 @@ def extruded(side: int) -> Skip:
     return Skip("extruded scene: one row of rays, swept", "a step", image(1), image(64))
 
 
+def observed(side: int) -> Skip:
+    """The rays of one incidence serve all directions that are observed."""
+    lattice = ft.studies.Lattice(10, 4)
+    theta = np.radians(np.arange(-60, 61, 20))
+    waves = np.linspace(400, 700, 16) * nm
+    given = {"rays": (1, 16 * side), "threads": 1}
+
+    def seen(angles: np.ndarray) -> np.ndarray:
+        cones = ft.goniometer.Cones(angles, math.radians(2.0))
+        return ft.goniometer.brdf(lattice.scene, theta, cones, waves, **given).values
+
+    def apart() -> list[np.ndarray]:
+        return [np.concatenate([seen(theta[i : i + 1]) for i in range(len(theta))], axis=2)]
+
+    return Skip(
+        "goniometer: one trace an incidence for all directions", "40 rods", lambda: [seen(theta)], apart
+    )
+
+
 SKIPS: dict[str, Callable[[int], Skip]] = {
     case.__name__: case
     for case in (
         shut, only_mirrors, in_place, culled, closed, doubted, dropped, unrecorded, uniform, rephased,
-        stepped, differences, even, unreached, scalar, transparent, vacuum, extruded, imported,
+        stepped, differences, even, unreached, scalar, transparent, vacuum, extruded,
+        observed, imported,
     )
 }  # fmt: skip
 
@@ -440,9 +460,9 @@ SECTION = """## What each skip saves
 The same work with a rule that leaves something out and without it, one thread, made by
 `benchmarks/skips.py --write`: medians of {rounds} runs in turn, {rays} rays.
 
-Visibility rays are never shot: shadows are found where sheets end, by rays of the beam itself. The
-goniometer traces once an incidence for all directions of observation, and `reciprocal=True` sums half of
-its table.
+Visibility rays are never shot: shadows are found where sheets end, by rays of the beam itself. Of a
+BRDF that is reciprocal `reciprocal=True` sums half of the table (ray sums are so only as far as their rays
+sample it: no row here).
 
 """
 
