@@ -1,7 +1,7 @@
 """Compile the kernels that most tests need, in two halves that know nothing of each other.
 
-python tests/compiled.py rays | light: run by conftest before all tests, one on each core. What is found compiled
-already is loaded.
+python tests/compiled.py rays | light: run by conftest before all tests, one on each core. What is found
+compiled already is loaded.
 """
 
 import sys

@@ -148,9 +148,7 @@ def test_what_does_not_fit_is_refused(options, message):
 
 
 def test_a_sample_that_is_no_mesh_is_refused():
-    with pytest.raises(
-        TypeError, match="expected a mesh with vertices and faces, or a pyvista.PolyData, got str"
-    ):
+    with pytest.raises(TypeError, match=r"expected a mesh with .*, or a pyvista\.PolyData, got str"):
         michelson(sample="step.stl")
 
 
