@@ -34,7 +34,7 @@ def test_a_surface_takes_whatever_has_vertices_and_faces():
 
 @pytest.mark.parametrize("value", ["mesh.stl", None, CORNERS, SimpleNamespace(vertices=CORNERS)])
 def test_a_surface_wants_a_mesh(value):
-    message = r"plate: expected a mesh with .*, or a pyvista\.PolyData, got .*files are read by .*meshes\.load"
+    message = r"plate: expected a mesh with .*, or a pyvista\.PolyData, got .*read by .*meshes\.load"
     with pytest.raises(TypeError, match=message):
         ft.Surface(value, ft.Mirror(), name="plate")
 

@@ -195,8 +195,6 @@ def lattice(
         As in `fringetrace brdf`.
     rays
         Across a lattice.
-    measured
-        CSV file of measured reflectances, as in `fringetrace brdf`.
     scheduler
         Address of a Dask scheduler. Default: this machine's cores.
     """
@@ -207,15 +205,7 @@ def lattice(
         "disorder": disorder, "seed": seed,
     }  # fmt: skip
     matter: dict[str, Any] = {"rod": rod, "host": host, "cortex": cortex, "channel": channel}
-    spoken = dict(given)
-    for name in ("radius", "pitch"):
-        given[name] = tuple(parse_length(value, f"--{name}") for value in given[name])
-    base = studies.Lattice(
-        **{name: values[0] for name, values in given.items()}, rod=_medium(rod), host=_medium(host),
-        cortex=0.0 if cortex is None else parse_length(cortex, "--cortex"),
-        channel=None if channel is None else parse_length(channel, "--channel"),
-    )  # fmt: skip
-    axes = {name: values for name, values in given.items() if len(values) > 1}
+    base, axes = _lattices(given, matter)
     theta = _steps((f"-{angles[0]}", *angles), "--angles", parse_angle)
     waves = _steps(wavelengths, "--wavelengths", parse_length)
     over = _measured(measured)
@@ -231,7 +221,7 @@ def lattice(
     with measurement.staged(out) as part:
         files = _write(table, part, over)
     count = int(np.prod([len(values) for values in axes.values()]))
-    named = [f"{name} {values[0]}" for name, values in spoken.items() if name not in axes]
+    named = [f"{name} {values[0]}" for name, values in given.items() if name not in axes]
     named += [f"{name} {value}" for name, value in matter.items() if value]
     return [
         ("lattices", f"{count}{' of ' if axes else ''}{', '.join(axes)}; {', '.join(named)}"),
@@ -248,6 +238,24 @@ def _medium(text: str | None) -> Any:
         return None if text is None else complex(text)
     except ValueError:
         return text
+
+
+def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, dict[str, Any]]:
+    """The first lattice, and the values of what has several."""
+    from fringetrace.studies import Lattice
+
+    lengths = {"radius", "pitch"}
+    values = {
+        name: tuple(parse_length(one, f"--{name}") for one in some) if name in lengths else some
+        for name, some in given.items()
+    }
+    cortex, channel = matter["cortex"], matter["channel"]
+    base = Lattice(
+        **{name: some[0] for name, some in values.items()}, rod=_medium(matter["rod"]),
+        host=_medium(matter["host"]), cortex=0.0 if cortex is None else parse_length(cortex, "--cortex"),
+        channel=None if channel is None else parse_length(channel, "--channel"),
+    )  # fmt: skip
+    return base, {name: some for name, some in values.items() if len(some) > 1}
 
 
 def _endless(
