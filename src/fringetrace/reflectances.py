@@ -245,7 +245,7 @@ def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, d
     from fringetrace.studies import Lattice
 
     lengths = {"radius", "pitch"}
-    values = {
+    values: dict[str, Any] = {
         name: tuple(parse_length(one, f"--{name}") for one in some) if name in lengths else some
         for name, some in given.items()
     }
