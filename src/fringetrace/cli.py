@@ -185,7 +185,7 @@ def bench(
 
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
     """Trace, measure, write; say what was done."""
-    from fringetrace import guards, measurement, runs
+    from fringetrace import exhibits, guards, measurement
     from fringetrace.field import chosen
 
     console = _console()
@@ -195,7 +195,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
         _say_bench(console, name, mesh, bench, wavelength)
         scene = None
         if settings.picture:
-            few = aside.submit(bench.sampled, runs.few(bench.beam.shape))
+            few = aside.submit(bench.sampled, exhibits.few(bench.beam.shape))
             scene = aside.submit(_draw, bench, few.result, folder)
             few.result()  # before the trace, which needs the same trees
         truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)

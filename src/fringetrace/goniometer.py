@@ -336,7 +336,7 @@ def reciprocity(table: DataArray) -> float:
 def sampling_error(table: DataArray, scene: Scene, detector: Detector, **options: Any) -> float:
     """How far a BRDF changes if half the rays are taken either way, at the middle one of its incidences.
 
-    Where rays are many enough for what they sample, it is at least what the table is off.
+    An estimate of what the table is off, where rays are many enough that twice as many change it less.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ import numpy as np
 from fringetrace import frames, guards, measurement, records, tables
 from fringetrace.arms import Mark
 from fringetrace.bench import Bench
-from fringetrace.exhibits import few as few
+from fringetrace.exhibits import few
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.media import needs
 from fringetrace.paths import Fate, Ledger, Paths
