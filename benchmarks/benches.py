@@ -9,10 +9,11 @@ import numpy as np
 import pages
 from imaged import refocused, waves
 
-from fringetrace import Dielectric, Mirror, Surface, forms, instruments, mm, nm, um
-from fringetrace.lines import Line, Spectrum
-from fringetrace.materials import BK7, CALCITE_E, CALCITE_O, CHITIN
-from fringetrace.shapes import extrude, icosphere, plate
+from fringetrace import Dielectric, Mirror, Surface, instruments, mm, nm, um
+from fringetrace.geometry import forms
+from fringetrace.geometry.shapes import extrude, icosphere, plate
+from fringetrace.optics.materials.named_materials import BK7, CALCITE_E, CALCITE_O, CHITIN
+from fringetrace.scene.spectrum import Line, Spectrum
 
 RED, HENE, SODIUM = 633 * nm, 632.8 * nm, 589.3 * nm
 CELL, WATER = 1.38, 1.335

@@ -17,11 +17,12 @@ import numpy as np
 import pages
 
 import fringetrace as ft
-from fringetrace import forms, instruments, mm, nm, shapes, um
-from fringetrace.budget import FEWEST, budget, facet_error, hit_error
-from fringetrace.rays import launch
-from fringetrace.sampling import count_error, offset_error, quadrature_error, sampling_error
-from fringetrace.vectors import rotation
+from fringetrace import instruments, mm, nm, um
+from fringetrace.accuracy.error_budget import FEWEST, budget, facet_error, hit_error
+from fringetrace.accuracy.sampling import count_error, offset_error, quadrature_error, sampling_error
+from fringetrace.core.vectors import rotation
+from fringetrace.geometry import forms, shapes
+from fringetrace.tracing.rays import launch
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 import arrivals

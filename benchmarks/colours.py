@@ -12,10 +12,13 @@ import numpy as np
 import pages
 from matplotlib.figure import Figure
 
-from fringetrace import FringetraceWarning, bsdf, nm, spectra, swatches, tables, um, views
+from fringetrace import FringetraceWarning, nm, um, views
+from fringetrace.core import tables
+from fringetrace.scattering import bsdf_tables, colour
+from fringetrace.views.plots import colour_plots
 
 IMAGES = Path(__file__).parents[1] / "docs" / "images"
-W = spectra.samples(4e-6)
+W = colour.samples(4e-6)
 
 
 def soap(thickness):
@@ -50,7 +53,7 @@ def warned(path, at):
     """Whether colours of fringes are warned of."""
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always", FringetraceWarning)
-        spectra.xyz(fringes(path, at), at)
+        colour.xyz(fringes(path, at), at)
     return bool(said)
 
 
@@ -58,12 +61,12 @@ def aliasing(steps=(1, 2.5, 5, 10), count=600):
     """From which path difference on fringes are warned of, and the worst that went without."""
     paths = np.geomspace(0.1, 1000, count) * um
     fine = np.linspace(360, 830, 47001) * nm
-    exact = spectra.weights(fine)
+    exact = colour.weights(fine)
     true = np.array([fringes(path, fine) @ exact for path in paths])
     worst, first = 0.0, {}
     for step in steps:
         at = np.arange(360, 830.1, step) * nm
-        weights = spectra.weights(at)
+        weights = colour.weights(at)
         told = np.array([warned(path, at) for path in paths])
         off = abs(fringes(paths[:, None], at) @ weights - true).max(axis=1)
         worst, first[step] = max(worst, off[~told].max()), paths[told.argmax()] / um
@@ -82,28 +85,28 @@ def main():
     if "--write" in sys.argv[1:]:
         pages.write("aliasing", said, pages.DOCS / "colour.md")
     thickness = np.array([50, 100, 150, 200, 250, 300, 400, 500])
-    colours = 10 * spectra.xyz(soap(thickness[:, None] * nm), W)
-    views.save(swatches.swatches(colours, [f"{d} nm" for d in thickness]), IMAGES / "colour_swatches.png")
+    colours = 10 * colour.xyz(soap(thickness[:, None] * nm), W)
+    views.save(colour_plots.swatches(colours, [f"{d} nm" for d in thickness]), IMAGES / "colour_swatches.png")
 
     theta, phi = np.radians(np.arange(0, 88, 3.0)), np.radians(np.arange(0, 360, 10.0))
     brdf = rough(theta, theta, phi)
-    table = bsdf.table(spectra.xyz(np.pi * brdf, W)[:, None], theta, [0.0], theta, phi, [0.0, 1.0, 2.0])
+    table = bsdf_tables.table(colour.xyz(np.pi * brdf, W)[:, None], theta, [0.0], theta, phi, [0.0, 1.0, 2.0])
     figure = Figure(figsize=(11.5, 4.6), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     in_plane = table.sel(phi_o=np.pi).isel(phi_i=0)
-    swatches.angles(np.asarray(in_plane), theta, theta, left)
+    colour_plots.angles(np.asarray(in_plane), theta, theta, left)
     left.set_title("rough pile of layers, in plane")
-    ball = bsdf.sphere(table, (0.5, 0.5, 0.7))
-    swatches.sphere(ball, middle, title="a sphere of it, one light")
-    mirror = spectra.xyz(layers(np.cos(theta)), W)
-    swatches.sphere(swatches.mirrored(mirror, theta), right, title="smooth, white sky all around")
+    ball = bsdf_tables.sphere(table, (0.5, 0.5, 0.7))
+    colour_plots.sphere(ball, middle, title="a sphere of it, one light")
+    mirror = colour.xyz(layers(np.cos(theta)), W)
+    colour_plots.sphere(colour_plots.mirrored(mirror, theta), right, title="smooth, white sky all around")
     views.save(figure, IMAGES / "colour_angles.png")
 
     noisy = layers(1.0) + np.random.default_rng(0).normal(0, 0.01, len(W))
     axes = {"sample": (["made up, with noise"], ""), "wavelength": (W, "m")}
     sample = tables.labelled(noisy[None], axes, name="reflectance", unit="1")
     both = layers(np.cos(np.radians([0, 40])))
-    ax = swatches.spectrum(both, W, labels=["0°", "40°"], measured=sample)
+    ax = colour_plots.spectrum(both, W, labels=["0°", "40°"], measured=sample)
     views.save(ax, IMAGES / "colour_spectrum.png")
 
 

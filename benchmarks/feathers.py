@@ -15,8 +15,10 @@ from matplotlib.figure import Figure
 
 import fringetrace as ft
 from fringetrace import degree, nm
-from fringetrace.goniometer import Cones, brdf
-from fringetrace.studies import Lattice, cluster, specular
+from fringetrace.scattering.detectors import Cones
+from fringetrace.scattering.goniometer import brdf
+from fringetrace.scattering.rod_lattice import Lattice
+from fringetrace.scattering.rod_studies import cluster, specular
 
 PAGE, FIGURE = pages.DOCS / "study.md", pages.DOCS / "images" / "feathers.png"
 WAVES = np.linspace(400, 700, 16) * nm

@@ -17,8 +17,10 @@ import numpy as np
 import pages
 
 import fringetrace as ft
-from fringetrace import degree, goniometer, nm, nufft, um
-from fringetrace.studies import Lattice
+from fringetrace import degree, nm, um
+from fringetrace.field import spectral_sum
+from fringetrace.scattering import goniometer
+from fringetrace.scattering.rod_lattice import Lattice
 
 ROUNDS = 3
 THETA = np.arange(-60, 61, 20) * degree
@@ -124,13 +126,13 @@ def fourier() -> list[tuple[str, str]]:
         length, amplitude = rng.uniform(0.0, 50 * um, count), np.exp(1j * rng.uniform(0.0, 6.3, count))
         pairs = [
             (
-                seconds(lambda x=length, a=amplitude: nufft.spectrum(x, a, WAVES)),
-                seconds(lambda x=length, a=amplitude: nufft.direct(x, a, WAVES)),
+                seconds(lambda x=length, a=amplitude: spectral_sum.spectrum(x, a, WAVES)),
+                seconds(lambda x=length, a=amplitude: spectral_sum.direct(x, a, WAVES)),
             )
             for _ in range(ROUNDS)
         ]
         error = np.abs(
-            nufft.spectrum(length, amplitude, WAVES) - nufft.direct(length, amplitude, WAVES)
+            spectral_sum.spectrum(length, amplitude, WAVES) - spectral_sum.direct(length, amplitude, WAVES)
         ).max()
         ratio = statistics.median(b / a for a, b in pairs)
         rows.append(

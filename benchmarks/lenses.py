@@ -91,7 +91,8 @@ def traced(
 ) -> dict[str, np.ndarray]:
     """Where our rays end; mm."""
     import fringetrace as ft
-    from fringetrace import lenses, mm
+    from fringetrace import mm
+    from fringetrace.instruments import lenses
 
     radii, thicknesses, indices = (np.array(column) for column in zip(*faces, strict=True))
     lens = lenses.lens(

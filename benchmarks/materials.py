@@ -5,7 +5,8 @@ from __future__ import annotations
 import pages
 
 from fringetrace import nm
-from fringetrace.materials import NAMED, Material
+from fringetrace.optics.materials.material import Material
+from fringetrace.optics.materials.named_materials import NAMED
 
 # Hydrogen F and C, sodium D.
 LINES = (486.13, 589.3, 656.27)

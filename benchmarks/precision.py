@@ -10,7 +10,8 @@ import sys
 
 import pages
 
-from fringetrace import precision, views
+from fringetrace import views
+from fringetrace.validation import work_precision
 
 PICTURE = "images/work_precision.png"
 
@@ -40,18 +41,18 @@ The most exact run of each:
 def main() -> None:
     """Print the table; write the section if asked to."""
     done = []
-    for run in precision.runs(quick="--quick" in sys.argv[1:]):
+    for run in work_precision.runs(quick="--quick" in sys.argv[1:]):
         done.append(run)
         print(
             f"{run.standard:32}{run.method:20}{run.rays:9d}{run.seconds:10.4f} s"
             f"{run.waves:10.1e} waves{run.irradiance:10.1e}",
             flush=True,
         )
-    table = precision.table(done)
+    table = work_precision.table(done)
     print(table)
     if "--write" in sys.argv[1:]:
-        views.save(views.comparison(precision.panels(done)), pages.ACCURACY.parent / PICTURE)
-        text = SECTION.format(cores=precision.machine()["cores"], table=table, picture=PICTURE)
+        views.save(views.comparison(work_precision.panels(done)), pages.ACCURACY.parent / PICTURE)
+        text = SECTION.format(cores=work_precision.machine()["cores"], table=table, picture=PICTURE)
         pages.write("precision", text)
 
 

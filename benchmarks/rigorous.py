@@ -17,8 +17,9 @@ from matplotlib.figure import Figure
 
 import fringetrace as ft
 from fringetrace import nm
-from fringetrace.cylinders import CONDUCTOR, Cylinders, amplitude, differential_width, scatter
-from fringetrace.lattices import spectrum
+from fringetrace.rigorous.cylinder_gratings import spectrum
+from fringetrace.rigorous.cylinders import Cylinders, amplitude, differential_width, scatter
+from fringetrace.rigorous.cylindrical_waves import CONDUCTOR
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from rods import FEATHERS, feather, keratin, melanin

@@ -14,7 +14,8 @@ import numpy as np
 import pages
 
 import fringetrace as ft
-from fringetrace import forms, nm, shapes
+from fringetrace import nm
+from fringetrace.geometry import forms, shapes
 
 RADIUS, GAP = 65 * nm, 150 * nm
 # Off the axes, where numbers round as they do anywhere.

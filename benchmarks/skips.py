@@ -27,7 +27,7 @@ import scenes
 
 import fringetrace as ft
 from fringetrace import mm, nm
-from fringetrace.engine import build
+from fringetrace.tracing.intersect.embree import build
 
 WAVE = 633 * nm
 ROUNDS = 5
@@ -401,14 +401,14 @@ def extruded(side: int) -> Skip:
 
 def observed(side: int) -> Skip:
     """The rays of one incidence serve all directions that are observed."""
-    lattice = ft.studies.Lattice(10, 4)
+    lattice = ft.scattering.Lattice(10, 4)
     theta = np.radians(np.arange(-60, 61, 20))
     waves = np.linspace(400, 700, 16) * nm
     given = {"rays": (1, 16 * side), "threads": 1}
 
     def seen(angles: np.ndarray) -> np.ndarray:
-        cones = ft.goniometer.Cones(angles, math.radians(2.0))
-        return ft.goniometer.brdf(lattice.scene, theta, cones, waves, **given).values
+        cones = ft.scattering.Cones(angles, math.radians(2.0))
+        return ft.scattering.brdf(lattice.scene, theta, cones, waves, **given).values
 
     def apart() -> list[np.ndarray]:
         return [np.concatenate([seen(theta[i : i + 1]) for i in range(len(theta))], axis=2)]

@@ -15,8 +15,9 @@ import mpmath
 import numpy as np
 
 import fringetrace as ft
-from fringetrace import forms, mm, nm, shapes, um
-from fringetrace.vectors import rotation, unit
+from fringetrace import mm, nm, um
+from fringetrace.core.vectors import rotation, unit
+from fringetrace.geometry import forms, shapes
 
 MIRROR = ft.Mirror()
 WAVE = 500 * nm

@@ -17,7 +17,7 @@ import pages
 from matplotlib.figure import Figure
 
 import fringetrace as ft
-from fringetrace import goniometer
+from fringetrace.scattering import goniometer
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT / "tests" / "data" / "scene_b_far.npz"

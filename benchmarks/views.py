@@ -6,7 +6,8 @@ import numpy as np
 from pages import DOCS
 
 import fringetrace as ft
-from fringetrace import instruments, mm, nm, shapes, views
+from fringetrace import instruments, mm, nm, views
+from fringetrace.geometry import shapes
 
 IMAGES = DOCS / "images"
 

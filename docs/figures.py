@@ -14,8 +14,8 @@ from matplotlib.patches import Rectangle
 
 import fringetrace as ft
 from fringetrace import mm, um
-from fringetrace.engine import build
-from fringetrace.sheets import sheets
+from fringetrace.field.wavefront.patches import sheets
+from fringetrace.tracing.intersect.embree import build
 
 IMAGES = Path(__file__).parent / "images"
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999"

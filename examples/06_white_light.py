@@ -12,7 +12,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fringetrace as ft
-from fringetrace import mm, nm, spectra, swatches, um
+from fringetrace import mm, nm, um
+from fringetrace.scattering import colour as spectra
+from fringetrace.views.plots import colour_plots
 
 thickness, aperture = 50 * um, 8 * mm  # of the splitter; width of the image
 tilt = 0.5e-3  # of the reference, rad
@@ -33,7 +35,7 @@ for name, strip, colour in zip(names, strips, ("#0072B2", "#D55E00"), strict=Tru
         splitter=ft.instruments.SplitterPlate(thickness, "BK7", ghosts=False), compensator=not alone,
     )  # fmt: skip
     images = np.stack([bench.interferogram(wavelength)[2] for wavelength in waves], axis=-1)
-    swatches.strip(spectra.xyz(images, waves, illuminant="E"), x / mm, strip)
+    colour_plots.strip(spectra.xyz(images, waves, illuminant="E"), x / mm, strip)
     strip.set_title(name)
     curves.plot(x / mm, images.mean(axis=-1), color=colour, label=name)
 

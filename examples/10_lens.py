@@ -12,7 +12,8 @@ from dataclasses import replace
 from matplotlib.figure import Figure
 
 import fringetrace as ft
-from fringetrace import lenses, mm, nm
+from fringetrace import mm, nm
+from fringetrace.instruments import lenses
 
 wavelength, aperture, ball = 632.8 * nm, 12 * mm, 50 * mm
 bk7 = float(ft.materials.BK7.index(wavelength).real)

@@ -10,7 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fringetrace as ft
-from fringetrace import mm, nm, spectra, swatches
+from fringetrace import mm, nm
+from fringetrace.scattering import colour
+from fringetrace.views.plots import colour_plots
 
 delay, layers = 220 * nm, np.arange(1, 9)
 waves = np.arange(400, 701, 5) * nm
@@ -39,11 +41,11 @@ for strip, (name, axis) in zip(strips, {"crossed": (0, 1, 0), "parallel": (1, 0,
     passed = np.array(images)[:, 0].T  # layers, wavelength
     expected = crossed if name == "crossed" else 1 - crossed
     print(f"{name}: off the closed form by {abs(passed - expected).max():.1e} at most")
-    swatches.swatches(spectra.xyz(passed, waves), layers, strip)
+    colour_plots.swatches(colour.xyz(passed, waves), layers, strip)
     strip.set(title=f"{name} polarisers, number of layers below")
     strip.set_aspect("auto")
     if name == "crossed":
-        swatches.spectrum(passed[[0, 2, 5]], waves, curves, labels=["1 layer", "3 layers", "6 layers"])
+        colour_plots.spectrum(passed[[0, 2, 5]], waves, curves, labels=["1 layer", "3 layers", "6 layers"])
 curves.set(ylabel="part that passes, crossed", ylim=(-0.08, 1.3))
 curves.legend(loc="upper right", ncols=3)
 ft.views.save(figure, "11_polarisers.png")

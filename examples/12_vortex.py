@@ -23,7 +23,7 @@ def gradient(x, y):
     return -rise * y / (x**2 + y**2), rise * x / (x**2 + y**2)
 
 
-spiral = ft.plates.PhasePlate(path, (0, 0, 0), (1, 0, 0), (0, 1, 0), gradient=gradient)
+spiral = ft.phase_plates.PhasePlate(path, (0, 0, 0), (1, 0, 0), (0, 1, 0), gradient=gradient)
 plate = ft.Surface(ft.shapes.plate(6 * mm, 6 * mm), spiral, "spiral plate")
 bench = ft.instruments.mach_zehnder(
     plate, aperture=4 * mm, reference_tilt=(0.8e-3, 0), pixels=(240, 240), rays=2, method="rays"

@@ -10,9 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fringetrace as ft
-from fringetrace import degree, goniometer, nm, um
+from fringetrace import degree, nm, um
+from fringetrace.scattering import goniometer
 
-rods = ft.studies.Lattice(columns=20, rows=4, radius=65 * nm, pitch=280 * nm)
+rods = ft.scattering.Lattice(columns=20, rows=4, radius=65 * nm, pitch=280 * nm)
 theta, waves, width = np.arange(-60, 61, 20) * degree, np.arange(300, 701) * nm, 5.6 * um
 
 

@@ -10,7 +10,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import fringetrace as ft
-from fringetrace import nm, spectra, studies, swatches
+from fringetrace import nm
+from fringetrace.scattering import colour, rod_studies
+from fringetrace.views.plots import colour_plots
 
 waves = np.arange(400, 701, 5) * nm
 # barbule: period along the normal, pitch along a row, rod diameter (nm), layers
@@ -23,11 +25,11 @@ BARBULES = {
 
 curves, labels = [], []
 for name, (period, pitch, diameter, layers) in BARBULES.items():
-    lattice = studies.Lattice(
+    lattice = rod_studies.Lattice(
         rows=layers, radius=0.5 * diameter * nm, pitch=pitch * nm, spacing=period * nm,
         arrangement="square", rod="melanin", host="keratin", cortex=100 * nm,
     )  # fmt: skip
-    reflectance = studies.specular(lattice, [0.0], waves).values[0]
+    reflectance = rod_studies.specular(lattice, [0.0], waves).values[0]
     curves.append(reflectance)
     labels.append(f"{layers} layers, {period} nm apart")
     part = np.pi * diameter**2 / (4 * period * pitch)  # of the section that is melanin
@@ -41,9 +43,9 @@ print("rays there:", lattice.validity(500 * nm))
 
 figure = Figure(figsize=(9, 6), layout="constrained")
 colours, panel = figure.subplots(2, 1, height_ratios=(1, 4))
-seen = spectra.xyz(np.array(curves), waves)
-swatches.swatches(3 * seen, labels, colours)
+seen = colour.xyz(np.array(curves), waves)
+colour_plots.swatches(3 * seen, labels, colours)
 colours.set_title("colours in daylight, three times as bright")
 colours.set_aspect("auto")
-swatches.spectrum(curves, waves, panel, labels=labels)
+colour_plots.spectrum(curves, waves, panel, labels=labels)
 ft.views.save(figure, "17_feather.png")

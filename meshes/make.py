@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fringetrace import Mesh, meshes, mm, nm, shapes, um
-from fringetrace.vectors import rotation
+from fringetrace import Mesh, mm, nm, um
+from fringetrace.core.vectors import rotation
+from fringetrace.geometry import meshes, shapes
 
 ARCSEC = np.pi / 648000
 

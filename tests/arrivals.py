@@ -3,9 +3,9 @@
 import numpy as np
 
 import fringetrace as ft
-from fringetrace.paths import Paths
-from fringetrace.rays import launch
-from fringetrace.vectors import frame
+from fringetrace.core.vectors import frame
+from fringetrace.tracing.paths import Paths
+from fringetrace.tracing.rays import launch
 
 SCENE = ft.Scene([ft.Surface(ft.shapes.plate(1.0, 1.0), ft.Mirror(), "mirror")])
 

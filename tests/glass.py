@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 import fringetrace as ft
-from fringetrace import shapes
+from fringetrace.geometry import shapes
 
 Y = np.array([0.0, 1.0, 0.0])
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fringetrace.elements import Meeting
+from fringetrace.optics.elements import Meeting
 
 EPS = float(np.finfo(np.float64).eps)
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from fringetrace import nm
-from fringetrace.lattices import Lattice, Row
+from fringetrace.rigorous.cylinder_gratings import Lattice, Row
 
 
 def keratin(wavelength):

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import degree, detectors, goniometer, nm, um
-from fringetrace.detectors import far_lengths
+from fringetrace import degree, nm, um
+from fringetrace.scattering import detectors, goniometer
+from fringetrace.scattering.detectors import far_lengths
 
 WAVES = np.linspace(400, 700, 31) * nm
 ROUNDING = 1e-10  # of sums of thousands of phasors at paths of some hundred waves, at their peak

@@ -4,13 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from fringetrace import instruments, mm, nm, um
-from fringetrace.lines import ERROR, Line, Spectrum
-from fringetrace.materials import BK7
-from fringetrace.shapes import plate
+from fringetrace.geometry.shapes import plate
+from fringetrace.optics.materials.named_materials import BK7
+from fringetrace.scene.spectrum import ERROR, Line, Spectrum
 
 GREEN = Line(550 * nm, 10 * nm)
 SODIUM = 588.995 * nm, 589.592 * nm

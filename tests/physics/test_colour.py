@@ -6,7 +6,9 @@ import tmm
 from scipy import constants
 
 import fringetrace as ft
-from fringetrace import films, goniometer, nm, spectra, um
+from fringetrace import nm, um
+from fringetrace.optics import films
+from fringetrace.scattering import colour, goniometer
 
 W = np.arange(360, 831, 5) * nm
 # Half a unit of the last digit printed, and as much again for the last digit of the tables.
@@ -31,13 +33,13 @@ ROUNDING = 1e-12
 def test_white_points(light, x, y):
     # black bodies: c2 = 1.4388e-2 m K here, 1.438777e-2 there, or 4e-6 in x
     tolerance = {"E": 5.5e-6}.get(light, 4.5e-6 if "K" in light else PRINTED)
-    assert spectra.chromaticity(spectra.white(light)) == pytest.approx([x, y], abs=tolerance)
+    assert colour.chromaticity(colour.white(light)) == pytest.approx([x, y], abs=tolerance)
 
 
 def test_a_black_body_is_plancks():
     at, kelvin = W, 3210.0
     law = at**-5 / np.expm1(constants.h * constants.c / (at * constants.k * kelvin))
-    found = spectra.illuminant("3210 K", at)
+    found = colour.illuminant("3210 K", at)
     assert found / found[40] == pytest.approx(
         law / law[40], rel=1e-5 * 14
     )  # the rounding of c2, c2/(wl T) = 12
@@ -46,7 +48,7 @@ def test_a_black_body_is_plancks():
 def test_equal_energy_is_one_third_each():
     # the CIE scaled its observers to equal sums over 5 nm, and rounded
     for degrees in (2, 10):
-        assert spectra.chromaticity(spectra.white("E", degrees)) == pytest.approx([1 / 3, 1 / 3], abs=1.5e-4)
+        assert colour.chromaticity(colour.white("E", degrees)) == pytest.approx([1 / 3, 1 / 3], abs=1.5e-4)
 
 
 @pytest.mark.parametrize(
@@ -64,9 +66,9 @@ def test_equal_energy_is_one_third_each():
     ],
 )
 def test_newtons_scale_of_colours(path, xyz, rgb):
-    found = spectra.xyz(np.sin(np.pi * path * nm / W) ** 2, W)
+    found = colour.xyz(np.sin(np.pi * path * nm / W) ** 2, W)
     assert found == pytest.approx(np.array(xyz), abs=PRINTED)
-    assert np.rint(255 * spectra.srgb(found)) == pytest.approx(rgb)
+    assert np.rint(255 * colour.srgb(found)) == pytest.approx(rgb)
 
 
 def film(thickness, n, below, at):
@@ -84,7 +86,7 @@ def film(thickness, n, below, at):
     ],
 )
 def test_a_soap_film(thickness, xyz):
-    found = spectra.xyz(film(thickness * nm, 1.33, 1.0, W), W)
+    found = colour.xyz(film(thickness * nm, 1.33, 1.0, W), W)
     assert found == pytest.approx(np.array(xyz), abs=0.1 * PRINTED)
 
 
@@ -100,25 +102,25 @@ def mirrored(surface, at, theta=0.0):
 def test_a_soap_film_under_the_goniometer():
     """From a traced face with a film on it to a colour."""
     soap = ft.Dielectric(film=films.Film(((1.33, 300 * nm),)))
-    found = spectra.xyz(mirrored(ft.Surface(ft.shapes.plate(um, um), soap, back=1.0), W), W)
+    found = colour.xyz(mirrored(ft.Surface(ft.shapes.plate(um, um), soap, back=1.0), W), W)
     assert found == pytest.approx(np.array([0.0515959, 0.0674916, 0.0417282]), abs=0.1 * PRINTED)
 
 
 def test_a_black_film_is_black_and_a_thick_one_white():
-    assert spectra.xyz(film(5 * nm, 1.33, 1.0, W), W)[1] < 1e-3
-    at = spectra.samples(2 * 1.33 * 40 * um)
-    thick = spectra.xyz(film(40 * um, 1.33, 1.0, at), at)
+    assert colour.xyz(film(5 * nm, 1.33, 1.0, W), W)[1] < 1e-3
+    at = colour.samples(2 * 1.33 * 40 * um)
+    thick = colour.xyz(film(40 * um, 1.33, 1.0, at), at)
     # fringes within every band of the eye: Airy's mean, 2 R / (1 + R) of one face, has no colour
     face = (0.33 / 2.33) ** 2
-    assert thick == pytest.approx(2 * face / (1 + face) * spectra.white(), rel=0.01)
+    assert thick == pytest.approx(2 * face / (1 + face) * colour.white(), rel=0.01)
 
 
 def test_oil_on_water_repeats_with_thickness_for_one_colour():
     # 2 n d = wavelength: one wavelength, so the same reflectance as no film at all
     sodium = 589.3 * nm
     assert film(sodium / (2 * 1.47), 1.47, 1.33, sodium) == pytest.approx(film(0.0, 1.47, 1.33, sodium))
-    bare = spectra.xyz(film(0.0, 1.47, 1.33, W), W)
-    assert bare == pytest.approx((0.33 / 2.33) ** 2 * spectra.white(), rel=1e-6)  # 4e-7: E tables
+    bare = colour.xyz(film(0.0, 1.47, 1.33, W), W)
+    assert bare == pytest.approx((0.33 / 2.33) ** 2 * colour.white(), rel=1e-6)  # 4e-7: E tables
 
 
 def morpho(angle):
@@ -131,7 +133,7 @@ def morpho(angle):
 def test_a_morpho_stack_turns_bluer_with_the_angle():
     straight, inclined = (morpho(np.radians(angle)) for angle in (0, 40))
     assert W[straight.argmax()] == pytest.approx(482.8 * nm, abs=5 * nm)  # 2 (n d + d'), on 5 nm
-    turned = spectra.lab(spectra.xyz([straight, inclined], W))
+    turned = colour.lab(colour.xyz([straight, inclined], W))
     hue = np.degrees(np.arctan2(turned[:, 2], turned[:, 1])) % 360
     assert hue[0] < hue[1] < 320  # from cyan (200) over blue (280)
     assert 160 < hue[0] < 260
@@ -147,7 +149,7 @@ def test_a_morpho_stack_under_the_goniometer():
     plate = ft.Surface(ft.shapes.plate(um, um), ft.Dielectric(film=scale), back=1.0)
     found = mirrored(plate, W, inclined)
     assert found == pytest.approx(true, rel=1e-9)
-    assert spectra.xyz(found, W) == pytest.approx(spectra.xyz(true, W), rel=1e-9)
+    assert colour.xyz(found, W) == pytest.approx(colour.xyz(true, W), rel=1e-9)
 
 
 def test_a_grating_shows_the_spectrum_in_order():
@@ -160,7 +162,7 @@ def test_a_grating_shows_the_spectrum_in_order():
     table = goniometer.brdf(scene, lit, looks, at, method="power", rays=(2, 2))
     seen = table.values[0, 0, :, 0] * looks.projected
     assert seen == pytest.approx(np.eye(3) / 3, abs=1e-9)  # three orders share the light
-    xy = spectra.chromaticity(seen @ spectra.observer(2, at))
+    xy = colour.chromaticity(seen @ colour.observer(2, at))
     # the spectrum locus of CIE 1931
     assert xy == pytest.approx(np.array([[0.1566, 0.0177], [0.3016, 0.6923], [0.7260, 0.2740]]), abs=6e-5)
 
@@ -170,9 +172,9 @@ def test_luminance_of_monochromatic_light():
     at = np.arange(360, 831) * nm
     radiance = np.zeros(len(at))
     radiance[555 - 360] = 1 / nm
-    assert spectra.luminance(radiance, at) == pytest.approx(683.0, rel=ROUNDING)
-    assert spectra.luminance(np.ones((2, len(at))), at).shape == (2,)
+    assert colour.luminance(radiance, at) == pytest.approx(683.0, rel=ROUNDING)
+    assert colour.luminance(np.ones((2, len(at))), at).shape == (2,)
 
 
 def test_of_a_lambertian_brdf_times_pi_the_colour_is_white():
-    assert spectra.xyz(np.pi * np.full(len(W), 1 / np.pi), W) == pytest.approx(spectra.white(), rel=ROUNDING)
+    assert colour.xyz(np.pi * np.full(len(W), 1 / np.pi), W) == pytest.approx(colour.white(), rel=ROUNDING)

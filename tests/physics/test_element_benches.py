@@ -5,11 +5,11 @@ import pytest
 from meetings import EPS
 
 import fringetrace as ft
-from fringetrace.crystals import ShearPlate, Wollaston
-from fringetrace.elements import Annulus, IdealLens
-from fringetrace.gratings import Grating, lamellar
-from fringetrace.plates import PhasePlate, zone_plate
-from fringetrace.polarisers import JonesPlate, Polariser, wave_plate
+from fringetrace.optics.birefringent import ShearPlate, Wollaston
+from fringetrace.optics.elements import Annulus, IdealLens
+from fringetrace.optics.gratings import Grating, lamellar
+from fringetrace.optics.phase_plates import PhasePlate, zone_plate
+from fringetrace.optics.polarisers import JonesPlate, Polariser, wave_plate
 
 # Points and paths of a few roundings of the bench's length, and directions, times the bench's length.
 PLACE = 64 * EPS

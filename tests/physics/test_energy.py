@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import fringetrace as ft
-from fringetrace import mm, nm, shapes
-from fringetrace.landing import project
-from fringetrace.vectors import rotation
+from fringetrace import mm, nm
+from fringetrace.core.vectors import rotation
+from fringetrace.geometry import shapes
+from fringetrace.tracing.detection import project
 
 # Powers are sums of some tens of terms.
 LEDGER = 1e-12

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import forms, mm, shapes
+from fringetrace import mm
+from fringetrace.geometry import forms, shapes
 
 MIRROR = ft.Mirror()
 # Some hundred roundings of float64, relative to the path.

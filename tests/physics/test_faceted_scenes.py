@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import instruments, mm, nm, regions, shapes, survey, um
-from fringetrace.vectors import rotation
+from fringetrace import instruments, mm, nm, um
+from fringetrace.core.vectors import rotation
+from fringetrace.field.wavefront import plane_waves, visibility
+from fringetrace.geometry import shapes
 
 HENE = 632.8 * nm
 # What the quadrature of a pixel may be off.
@@ -148,7 +150,7 @@ def test_a_lattice_of_rods_is_the_same_from_any_number_of_rays():
 
 def pieces(bench):
     """Cells that edges cut."""
-    found = regions.waves(survey.survey(bench.trace()))
+    found = plane_waves.waves(visibility.survey(bench.trace()))
     return sum((region.kind == 2).sum() for _, region in found)
 
 

@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from test_curved_mirrors import COVERAGE, HENE, SIDE, landing, paraboloid, rms, scanned, seen
+from converging import COVERAGE, HENE, SIDE, landing, paraboloid, rms, scanned, seen
 
 import fringetrace as ft
-from fringetrace import forms, instruments, mm, nm, probes, shapes, um
-from fringetrace.vectors import rotation
+from fringetrace import instruments, mm, nm, um
+from fringetrace.core.vectors import rotation
+from fringetrace.field.wavefront import probe
+from fringetrace.geometry import forms, shapes
 
 # Edges of plane waves are known to 1e-7 of a cell, a few cells to a feature's width.
 SHARP = 1e-6
@@ -20,13 +22,13 @@ X = 0.13 * mm
 def sent(monkeypatch):
     """Rays of each trace that looks where light goes."""
     counts = []
-    trace = probes.trace
+    trace = probe.trace
 
     def counted(scene, rays, *args, **options):
         counts.append(len(rays))
         return trace(scene, rays, *args, **options)
 
-    monkeypatch.setattr(probes, "trace", counted)
+    monkeypatch.setattr(probe, "trace", counted)
     return counts
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import Dielectric, Mirror, Surface, films, instruments, mm, nm, um
-from fringetrace.films import Film
-from fringetrace.shapes import plate
+from fringetrace import Dielectric, Mirror, Surface, instruments, mm, nm, um
+from fringetrace.geometry.shapes import plate
+from fringetrace.optics import films
+from fringetrace.optics.films import Film
 
 HENE = 632.8 * nm
 GLASS = 1.5

@@ -6,11 +6,11 @@ import math
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from fringetrace import films, layers, nm
-from fringetrace.waves import degree
+from fringetrace import nm
+from fringetrace.core.units import degree
+from fringetrace.optics import film_kernels, films
 
 EPS = float(np.finfo(np.float64).eps)
 # Reference numbers are printed with nine decimals.
@@ -128,7 +128,7 @@ def test_keratin_to_melanin():
 
 
 def test_into_an_absorbing_medium():
-    kz = layers.normal(1.7428 + 0.08789j, 0.5 + 0j)
+    kz = film_kernels.normal(1.7428 + 0.08789j, 0.5 + 0j)
     assert kz == pytest.approx(1.593383 + 0.096132j, abs=0.71e-6)
 
 
@@ -149,8 +149,8 @@ def test_stokes_relations(first, last, angle):
     if sine2.real > (0.999 * last) ** 2:  # total reflection: there is no wave to send back
         return
     none, nothing = np.empty(0, np.complex128), np.empty(0)
-    there = layers.stack(sine2, complex(first), none, nothing, complex(last), 1.0)
-    back = layers.stack(sine2, complex(last), none, nothing, complex(first), 1.0)
+    there = film_kernels.stack(sine2, complex(first), none, nothing, complex(last), 1.0)
+    back = film_kernels.stack(sine2, complex(last), none, nothing, complex(first), 1.0)
     for part in (0, 1):
         # kz of each side is off by the rounding of n^2 - sine2
         worst = 20 * EPS * max(first**2 / abs(first**2 - sine2), last**2 / abs(last**2 - sine2))

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import lenses, mm, nm, shapes, um
-from fringetrace.vectors import rotation
+from fringetrace import mm, nm, um
+from fringetrace.core.vectors import rotation
+from fringetrace.geometry import shapes
+from fringetrace.instruments import lenses
 
 INF, GLASS, SODIUM, R = math.inf, 1.5, 589.3 * nm, 1.0
 IN, OUT = 4 * mm, 5 * mm  # thickness of the glass above and below the gap

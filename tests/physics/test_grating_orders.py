@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from meetings import EPS, meeting, power
 
-from fringetrace.gratings import Grating, lamellar, sinusoidal
+from fringetrace.optics.gratings import Grating, lamellar, sinusoidal
 
 # Angles from sines near 1 lose a factor tan(65 degrees) of some ten roundings.
 ROUNDING = 64 * EPS

@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from meetings import EPS, meeting, power
 
-from fringetrace.crystals import ShearPlate
-from fringetrace.polarisers import Polariser, wave_plate
+from fringetrace.optics.birefringent import ShearPlate
+from fringetrace.optics.polarisers import Polariser, wave_plate
 
 # Printed with so many digits after the point.
 NINE = 0.5e-9

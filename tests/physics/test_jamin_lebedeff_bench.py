@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fringetrace import Dielectric, Surface, instruments, nm, um
-from fringetrace.films import fresnel
-from fringetrace.materials import CALCITE_E, CALCITE_O, CHITIN
-from fringetrace.plates import PhasePlate
-from fringetrace.shapes import extrude, plate
+from fringetrace.geometry.shapes import extrude, plate
+from fringetrace.optics.films import fresnel
+from fringetrace.optics.materials.named_materials import CALCITE_E, CALCITE_O, CHITIN
+from fringetrace.optics.phase_plates import PhasePlate
 
 SODIUM = 589.3 * nm
 NINE = 0.5e-9

@@ -8,12 +8,12 @@ from pathlib import Path
 import mpmath
 import numpy as np
 import pytest
-from sequential import Face, crossing
-from sequential import trace as exact
+from sequential import Face, crossing, trace as exact
 
 import fringetrace as ft
-from fringetrace import lenses, mm
-from fringetrace.vectors import rotation
+from fringetrace import mm
+from fringetrace.core.vectors import rotation
+from fringetrace.instruments import lenses
 
 INF = math.inf
 N = 1.5168

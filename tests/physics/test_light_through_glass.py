@@ -7,15 +7,17 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import forms, mm, nm, shapes, um
-from fringetrace.bounds import bounds
-from fringetrace.budget import facet_error, hit_error
-from fringetrace.contacts import indices, rounding
-from fringetrace.films import Film
-from fringetrace.interfaces import reflect
-from fringetrace.media import at_wavelength
-from fringetrace.sampling import quadrature_error, sampling_error
-from fringetrace.vectors import rotation
+from fringetrace import mm, nm, um
+from fringetrace.accuracy.error_budget import facet_error, hit_error
+from fringetrace.accuracy.path_errors import rounding
+from fringetrace.accuracy.ray_bounds import bounds
+from fringetrace.accuracy.sampling import quadrature_error, sampling_error
+from fringetrace.core.vectors import rotation
+from fringetrace.geometry import forms, shapes
+from fringetrace.optics.films import Film
+from fringetrace.optics.interfaces import reflect
+from fringetrace.tracing.rewavelength import at_wavelength
+from fringetrace.tracing.segments import indices
 
 HENE = cases.HENE
 # Means over pixels are good to 1e-6 of the field.

@@ -8,8 +8,9 @@ import pytest
 from imaged import refocused, waves
 
 import fringetrace as ft
-from fringetrace import Dielectric, Surface, forms, instruments, mm, nm, um
-from fringetrace.shapes import extrude, icosphere, plate
+from fringetrace import Dielectric, Surface, instruments, mm, nm, um
+from fringetrace.geometry import forms
+from fringetrace.geometry.shapes import extrude, icosphere, plate
 
 RED = 633 * nm
 CELL, WATER = 1.38, 1.335

@@ -10,8 +10,8 @@ from scipy.special import erf
 
 import fringetrace as ft
 from fringetrace import instruments, mm, nm, um
-from fringetrace.meshes import interpolate_height
-from fringetrace.shapes import height_map, plate, step
+from fringetrace.geometry.meshes import interpolate_height
+from fringetrace.geometry.shapes import height_map, plate, step
 
 HENE = 632.8 * nm
 APERTURE = 6 * mm

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import fringetrace as ft
-from fringetrace import Fate, mm, nm, shapes
-from fringetrace.vectors import rotation, unit
+from fringetrace import Fate, mm, nm
+from fringetrace.core.vectors import rotation, unit
+from fringetrace.geometry import shapes
 
 MIRROR = ft.Mirror()
 # Part of the path; a path has some tens of roundings.

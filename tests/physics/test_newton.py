@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import mm, nm, shapes, um
+from fringetrace import mm, nm, um
+from fringetrace.geometry import shapes
 
 SODIUM = 589.3 * nm
 R, HEIGHT = 1.0, 10 * mm

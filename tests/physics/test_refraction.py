@@ -6,12 +6,12 @@ import math
 import glass
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import fringetrace as ft
-from fringetrace import Fate, Mesh, forms, nm, shapes, um
-from fringetrace.waves import degree
+from fringetrace import Fate, Mesh, nm, um
+from fringetrace.core.units import degree
+from fringetrace.geometry import forms, shapes
 
 EPS = float(np.finfo(np.float64).eps)
 # Reference numbers are printed with nine decimals.

@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from fringetrace import meshes, mm, shapes
+from fringetrace import mm
+from fringetrace.geometry import meshes, shapes
 
 
 def facets(mesh):

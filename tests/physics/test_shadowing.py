@@ -12,7 +12,7 @@ import pytest
 import shadowing
 
 import fringetrace as ft
-from fringetrace.contacts import rounding
+from fringetrace.accuracy.path_errors import rounding
 
 # Roundings of coordinates of some 100 nm, in metres: 1.3e-23 each.
 ROUNDING = 2.0**-53 * 100e-9

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from meetings import EPS, meeting, power
 
-from fringetrace.crystals import ShearPlate, Wollaston
-from fringetrace.polarisers import Polariser, Retarder
+from fringetrace.optics.birefringent import ShearPlate, Wollaston
+from fringetrace.optics.polarisers import Polariser, Retarder
 
 # Printed with so many digits after the point.
 NINE = 0.5e-9

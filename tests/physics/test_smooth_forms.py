@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import forms, shapes
-from fringetrace.vectors import unit
+from fringetrace.core.vectors import unit
+from fringetrace.geometry import forms, shapes
 
 MIRROR = ft.Mirror()
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import fringetrace as ft
-from fringetrace import goniometer, landing
+from fringetrace.scattering import goniometer
+from fringetrace.tracing import detection
 
 DATA = Path(__file__).parents[1] / "data"
 UNIT = 10e-6  # metres to a scene unit of the lattice
@@ -124,7 +125,7 @@ def test_lattice_detections(lattice, lattice_paths):
     for i, paths in enumerate(lattice_paths):
         stable = lattice["stable_1e_6"][i]
         for out in range(7):
-            seen = landing.project(paths, far_ccd(lattice, out))
+            seen = detection.project(paths, far_ccd(lattice, out))
             hits = (seen.fate == ft.Fate.DETECTED) & (seen.bounces > 0)
             truth = lattice["det_nrefl"][i, out] > 0
             # the last digits decide at the very rim of the pixel
@@ -157,7 +158,7 @@ def test_lattice_spectra(lattice, lattice_paths, name, most, loss):
             truth = lattice["det_nrefl"][i, out]
             if (~stable & (truth > 0)).any():
                 continue  # a ray whose path hangs on the last digits contributes
-            seen = landing.project(paths, far_ccd(lattice, out))
+            seen = detection.project(paths, far_ccd(lattice, out))
             chosen = seen.where((seen.bounces > 0) & (seen.bounces <= most) & stable)
             sums = [abs(ft.complex_field(chosen, w, half_wave_loss=loss)[0, 0]) for w in wavelengths]
             assert np.abs(np.array(sums) - lattice[name][i, out, ::80]).max() < INTENSITY

@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 import tmm
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
-from fringetrace import films, materials, nm
-from fringetrace.films import Film
-from fringetrace.layers import stack
-from fringetrace.waves import degree
+from fringetrace import nm
+from fringetrace.core.units import degree
+from fringetrace.optics import films, materials
+from fringetrace.optics.film_kernels import stack
+from fringetrace.optics.films import Film
 
 EPS = float(np.finfo(np.float64).eps)
 # Reference numbers are printed with nine decimals.

@@ -3,12 +3,11 @@
 import mpmath
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from meetings import EPS, meeting
 
-from fringetrace.elements import IdealLens
-from fringetrace.plates import zone_plate
+from fringetrace.optics.elements import IdealLens
+from fringetrace.optics.phase_plates import zone_plate
 
 # Lengths are sums of a few numbers below a metre, each rounded: of the whole path.
 PATH = 2 * EPS

@@ -6,13 +6,12 @@ import glass
 import numpy as np
 import pytest
 import tmm
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 import fringetrace as ft
 from fringetrace import nm, um
-from fringetrace.films import Film, quarter_wave_stack
-from fringetrace.waves import degree
+from fringetrace.core.units import degree
+from fringetrace.optics.films import Film, quarter_wave_stack
 
 # Reference numbers are printed with nine decimals.
 PRINTED = 0.51e-9

@@ -1,0 +1,204 @@
+"""What the number of rays, and of points in a pixel, costs a field: in waves, without knowing the truth."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import Array, ComplexArray
+from fringetrace.field import assemble, centred, complex_field
+from fringetrace.scene import CCD, Beam, pixels
+from fringetrace.tracing import Paths
+
+# Bands of the image that stand for all of it: their middles, in parts of its height, and pixel rows in each.
+BANDS = (0.1, 0.5, 0.9)
+ROWS = 4
+# Pixel rows in each band for the ray sum, which has more to average.
+MANY = 24
+# Points a pixel, along either axis, that are more than enough: each makes the error many times less.
+MORE = 4
+# By halving the ray spacing an error falls as it is seen to, but no less than by 3 nor more than by 2^4.
+LEAST_FALL, MOST_FALL = 3.0, 16.0
+
+
+def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) -> float:
+    """Fields less others, as waves of phase: see `budget.Budget`."""
+    off = sum(float((np.abs(a - b) ** 2).sum()) for a, b in zip(fields, others, strict=True))
+    all_ = sum(float((np.abs(a) ** 2).sum()) for a in fields)
+    return math.sqrt(off / all_) / (2.0 * math.pi) if all_ > 0.0 else 0.0
+
+
+def bands(ccd: CCD, height: int = ROWS) -> list[CCD]:
+    """Parts of a CCD that stand for all of it: some rows near its lower end, its middle, its upper end.
+
+    Parameters
+    ----------
+    ccd : CCD
+    height : int
+        Rows of each.
+
+    Returns
+    -------
+    list of CCD
+        The whole, if it has few rows.
+    """
+    rows, columns = ccd.shape
+    if rows <= height * len(BANDS):
+        return [ccd]
+    tops = [round(min(max(part * rows - 0.5 * height, 0.0), rows - height)) for part in BANDS]
+    return [_cut(ccd, top, height, columns) for top in tops]
+
+
+def _onto(paths: Paths, ccd: CCD) -> Paths:
+    """The paths that arrive on a part of their CCD, as they are seen there."""
+    at = pixels(ccd, paths.origin)
+    inside = np.asarray(((at >= 0.0) & (at < ccd.shape)).all(axis=1))
+    return replace(paths.where(inside), ccd=ccd)
+
+
+def _cut(ccd: CCD, row: int, rows: int, columns: int, size: int = 1) -> CCD:
+    """Rows of a CCD from one on, and columns from the first on; pixels of size x size of its own as one."""
+    u, v, _ = ccd.axes
+    middle_u = 0.5 * (columns - ccd.shape[1]) * ccd.pitch
+    middle_v = (row + 0.5 * (rows - ccd.shape[0])) * ccd.pitch
+    shape = (rows // size, columns // size)
+    return replace(ccd, centre=ccd.centre + middle_u * u + middle_v * v, pitch=ccd.pitch * size, shape=shape)
+
+
+def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0) -> float:
+    """What the number of rays costs the wavefront method.
+
+    The error falls from grid to grid as it is seen to fall, by 16 at most: the method's fourth order.
+
+    Parameters
+    ----------
+    grids : sequence of Paths
+        The same beam with ever fewer rays, half as many either way; three, or more.
+    wavelength : float, metres
+    steps : float
+        How often the finest grid is to be halved until it is the one asked for.
+
+    Returns
+    -------
+    float, waves; see `budget.Budget`
+    """
+    assert grids[0].ccd is not None
+    parts = bands(grids[0].ccd)
+    fields = [
+        [complex_field(replace(paths, ccd=ccd), wavelength, "wavefront") for ccd in parts] for paths in grids
+    ]
+    change = [_difference(fine, coarse) for fine, coarse in pairwise(fields)]
+    if change[0] == 0.0:
+        return 0.0
+    fall = min(max(change[1] / change[0], LEAST_FALL), MOST_FALL)
+    return float(change[0] / (fall - 1.0) * fall**-steps)
+
+
+def quadrature_error(paths: Paths, wavelength: float) -> float:
+    """What the points in each pixel cost the wavefront method: some more of them along either axis.
+
+    Parameters
+    ----------
+    paths : Paths
+    wavelength : float, metres
+
+    Returns
+    -------
+    float, waves; see `budget.Budget`
+    """
+    assert paths.ccd is not None
+    fields: list[ComplexArray] = []
+    finer: list[ComplexArray] = []
+    groups = np.zeros(len(paths), dtype=np.int64)
+    axes = (None,) if paths.field is None else paths.ccd.axes
+    for ccd in bands(paths.ccd):
+        for axis in axes:
+            light = [assemble.light(replace(paths, ccd=ccd), groups, axis=axis)]
+            for images, more in ((fields, 0), (finer, MORE)):
+                images.append(assemble.fields(light, 1, ccd.shape, wavelength, True, more)[0])
+    return _difference(fields, finer)
+
+
+def spread(paths: Paths, wavelength: float) -> Paths:
+    """Rays that stand for the mean of their plane wave over their part of the pixel that they fall in.
+
+    Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
+    part, see `centred`, and has its amplitude times sinc of the cycles over the part, along either side.
+
+    Parameters
+    ----------
+    paths : Paths
+        Detected.
+    wavelength : float, metres
+
+    Returns
+    -------
+    Paths
+    """
+    assert paths.ccd is not None
+    assert paths.area is not None
+    parts = max(1, round(paths.ccd.pitch / math.sqrt(paths.area)))
+    cycles = paths.gradient @ np.transpose(paths.ccd.axes[:2]) * (paths.ccd.pitch / parts / wavelength)
+    mean = np.sinc(cycles).prod(axis=1)
+    return replace(centred(paths, parts), amplitude=paths.amplitude * mean)
+
+
+def offset_error(paths: Paths, wavelength: float) -> float:
+    """What it costs the ray sum that a ray counts where it lands, not by its mean over part of the pixel.
+
+    Parameters
+    ----------
+    paths : Paths
+    wavelength : float, metres
+
+    Returns
+    -------
+    float, waves; see `budget.Budget`
+    """
+    assert paths.ccd is not None
+    seen = paths.detected
+    parts = [_onto(seen, ccd) for ccd in bands(paths.ccd, MANY)]
+    means = [complex_field(spread(part, wavelength), wavelength, "rays") for part in parts]
+    return _difference(means, [complex_field(part, wavelength, "rays") for part in parts])
+
+
+def count_error(paths: Paths, wavelength: float) -> float:
+    """What it costs the ray sum that pixels get more or fewer rays than their share of light.
+
+    Every second ray either way, on pixels twice as large, against all of them: there are as many
+    rays a pixel, so the smaller sum is off by as much as the image itself.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of a `Beam`.
+    wavelength : float, metres
+
+    Returns
+    -------
+    float, waves; see `budget.Budget`
+    """
+    assert paths.ccd is not None
+    assert isinstance(paths.source, Beam)
+    seen, fields, others = paths.detected, [], []
+    for ccd in bands(paths.ccd, MANY):
+        rows, columns = (n - n % 2 for n in ccd.shape)
+        if rows == 0 or columns == 0:
+            return 0.0
+        all_ = _onto(seen, _cut(ccd, 0, rows, columns, size=2))
+        row, column = np.divmod(all_.ray, paths.source.shape[1])
+        few = all_.where(_even(row) & _even(column))
+        assert few.area is not None
+        few = replace(few, area=4.0 * few.area)
+        fields.append(complex_field(spread(all_, wavelength), wavelength, "rays"))
+        others.append(complex_field(spread(few, wavelength), wavelength, "rays"))
+    return _difference(fields, others)
+
+
+def _even(number: Array) -> npt.NDArray[np.bool_]:
+    return np.asarray(number % 2 == 0)

@@ -1,0 +1,5 @@
+"""Units, vectors, checks, labelled tables, files, sweeps and compiled loops: nothing optical."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

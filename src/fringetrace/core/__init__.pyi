@@ -1,0 +1,40 @@
+from . import sweeps as sweeps, tables as tables, vectors as vectors
+from .compiled import grown as grown, jit as jit, part as part
+from .files import staged as staged, whole as whole
+from .sweeps import grid as grid, sweep as sweep
+from .tables import (
+    Axes as Axes,
+    array as array,
+    read_csv as read_csv,
+    write_csv as write_csv,
+)
+from .units import (
+    Array as Array,
+    ComplexArray as ComplexArray,
+    FloatArray as FloatArray,
+    checked_length as checked_length,
+    checked_wavelength as checked_wavelength,
+    checked_wavelengths as checked_wavelengths,
+    degree as degree,
+    mm as mm,
+    nm as nm,
+    parse_angle as parse_angle,
+    parse_length as parse_length,
+    path_phase as path_phase,
+    um as um,
+    unit_length as unit_length,
+    unit_of as unit_of,
+    wavenumber as wavenumber,
+)
+from .vectors import (
+    ROUNDED as ROUNDED,
+    checked_direction as checked_direction,
+    checked_rotation as checked_rotation,
+    checked_vector as checked_vector,
+    component as component,
+    frame as frame,
+    rotation as rotation,
+    unit as unit,
+)
+from .version import __version__ as __version__
+from .warnings import FringetraceWarning as FringetraceWarning

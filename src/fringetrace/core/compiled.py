@@ -1,0 +1,26 @@
+"""Numba decorators of the compiled loops, and the growth of their tables."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+# No fast mathematics, here or in a caller (numba hands it on): a fused multiplication and addition
+# would round the two sides of an edge differently, and rays would slip through.
+jit: Any = njit(nogil=True, cache=True, error_model="numpy")
+
+
+part: Any = njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
+
+
+@jit
+def grown(table):
+    """The rows of a full table, and as many blank ones after them."""
+    # an array put into a slice would take numba 7 s, for the text of an error that cannot happen
+    larger = np.empty((2 * len(table), table.shape[1]), table.dtype)
+    for row in range(len(table)):
+        for column in range(table.shape[1]):
+            larger[row, column] = table[row, column]
+    return larger

@@ -1,0 +1,267 @@
+"""Units at the door, and the way from optical path to phase and back."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+FloatArray = npt.NDArray[np.float64]
+ComplexArray = npt.NDArray[np.complex128]
+
+nm: float = 1e-9
+um: float = 1e-6
+mm: float = 1e-3
+degree: float = math.pi / 180.0
+
+LENGTHS: dict[str, float] = {
+    "pm": 1e-12,
+    "nm": 1e-9,
+    "um": 1e-6,
+    "µm": 1e-6,  # micro sign
+    "μm": 1e-6,  # Greek mu
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "m": 1.0,
+    "km": 1e3,
+    "in": 0.0254,
+}
+ANGLES: dict[str, float] = {
+    "deg": degree,
+    "°": degree,
+    "degree": degree,
+    "degrees": degree,
+    "rad": 1.0,
+    "mrad": 1e-3,
+    "urad": 1e-6,
+    "arcmin": degree / 60.0,
+    "arcsec": degree / 3600.0,
+}
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\s]\S*)\s*")
+
+# What lengths are shown in.
+SHOWN: tuple[tuple[str, float], ...] = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9), ("pm", 1e-12))
+
+
+def unit_of(length: float) -> tuple[str, float]:
+    """The unit in which a length has a few digits before the point.
+
+    Parameters
+    ----------
+    length : float, metres
+
+    Returns
+    -------
+    name : str
+    metres : float
+        How long one of it is.
+    """
+    size = abs(length)
+    for name, metres in SHOWN:
+        if size >= metres:
+            return name, metres
+    return SHOWN[-1] if size > 0.0 else SHOWN[0]
+
+
+def _parse(text: str, what: str, units: dict[str, float]) -> float:
+    """A number with a unit of one kind, in the SI unit."""
+    match = _QUANTITY.fullmatch(text) if isinstance(text, str) else None
+    if match is None or match[2] not in units:
+        example = next(iter(units))
+        raise ValueError(
+            f"{what}: expected a number and a unit such as '1 {example}' "
+            f"(units: {', '.join(units)}), got {text!r}"
+        )
+    value = float(match[1]) * units[match[2]]
+    if not math.isfinite(value):
+        raise ValueError(f"{what}: expected a finite number, got {text!r}")
+    return value
+
+
+def checked_length(value: float, what: str) -> float:
+    """The length itself, once it is known to be one.
+
+    Parameters
+    ----------
+    value : float, metres
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    float, metres
+
+    Raises
+    ------
+    ValueError
+        If it is not a positive finite number.
+    """
+    if isinstance(value, str) or not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
+    return float(value)
+
+
+def parse_length(text: str, what: str = "length") -> float:
+    """Length in text, in metres.
+
+    Parameters
+    ----------
+    text : str
+        A number and a unit, such as ``"633 nm"``.
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    float, metres
+
+    Raises
+    ------
+    ValueError
+        If there is no finite number, no unit, or an unknown unit.
+    """
+    return _parse(text, what, LENGTHS)
+
+
+def parse_angle(text: str, what: str = "angle") -> float:
+    """Angle in text, in radians; raises like `parse_length`.
+
+    Parameters
+    ----------
+    text : str
+        A number and a unit, such as ``"20 deg"``.
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    float, radians
+    """
+    return _parse(text, what, ANGLES)
+
+
+def unit_length(unit: str | None, what: str = "unit") -> float:
+    """Metres in one of a named unit.
+
+    Parameters
+    ----------
+    unit : str or None
+        Name of the unit, such as ``"um"``. None is refused: mesh files carry no unit.
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    float, metres
+
+    Raises
+    ------
+    ValueError
+        If the unit is missing or unknown.
+    """
+    if unit not in LENGTHS:
+        raise ValueError(f"{what}: expected one of {', '.join(LENGTHS)}, got {unit!r}")
+    return LENGTHS[unit]
+
+
+def checked_wavelength(wavelength: float) -> float:
+    """The wavelength itself, once it is known to be one.
+
+    Parameters
+    ----------
+    wavelength : float, metres
+        Vacuum wavelength.
+
+    Returns
+    -------
+    float, metres
+
+    Raises
+    ------
+    ValueError
+        If it is not a positive finite number.
+    """
+    if isinstance(wavelength, (str, bytes)):
+        raise ValueError(f"wavelength: expected metres, got text {wavelength!r}; see parse_length")
+    value = float(wavelength)
+    if not (math.isfinite(value) and value > 0.0):
+        raise ValueError(f"wavelength: expected a positive length in metres, got {wavelength!r}")
+    return value
+
+
+def wavenumber(wavelength: float) -> float:
+    """Vacuum wavenumber k = 2 pi / wavelength.
+
+    Parameters
+    ----------
+    wavelength : float, metres
+
+    Returns
+    -------
+    float, rad/m
+    """
+    return 2.0 * math.pi / checked_wavelength(wavelength)
+
+
+def path_phase(length: FloatArray | float, wavelength: float) -> FloatArray:
+    """Phase of an optical path, reduced modulo the wavelength before it is scaled.
+
+    Parameters
+    ----------
+    length : float64, metres, any shape
+        Optical path length.
+    wavelength : float, metres
+
+    Returns
+    -------
+    float64, radians in [-pi, pi], shape of `length`
+        The remainder is exact (IEEE), so a phase costs no digits on long paths.
+    """
+    period = checked_wavelength(wavelength)
+    fold = np.fmod(np.asarray(length, dtype=np.float64), period)
+    fold = np.where(np.abs(fold) > 0.5 * period, fold - np.copysign(period, fold), fold)
+    return np.asarray(2.0 * math.pi * (fold / period), dtype=np.float64)
+
+
+def phase_path(phase: FloatArray | float, wavelength: float) -> FloatArray:
+    """Optical path that belongs to a phase: phase * wavelength / (2 pi).
+
+    Parameters
+    ----------
+    phase : float64, radians, any shape
+    wavelength : float, metres
+
+    Returns
+    -------
+    float64, metres, shape of `phase`
+    """
+    turns = np.asarray(phase, dtype=np.float64) / (2.0 * math.pi)
+    return np.asarray(turns * checked_wavelength(wavelength), dtype=np.float64)
+
+
+def checked_wavelengths(wavelengths: npt.ArrayLike) -> FloatArray:
+    """Wavelengths as an array, once they are known to be some.
+
+    Parameters
+    ----------
+    wavelengths : float or (w,) array-like, metres
+
+    Returns
+    -------
+    (w,) float64, metres
+
+    Raises
+    ------
+    ValueError
+        If there are none, or one is not a positive finite number.
+    """
+    values = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
+    if values.ndim != 1 or values.size == 0:
+        raise ValueError(f"wavelengths: expected numbers of shape (w,), got shape {values.shape}")
+    for value in values[~(np.isfinite(values) & (values > 0.0))][:1]:
+        checked_wavelength(value)
+    return values

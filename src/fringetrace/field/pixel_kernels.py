@@ -1,0 +1,171 @@
+"""Fused loops over pixels: their sample points, cut along edges where any cross them, and means over them.
+
+Sample points are in compressed rows: those of pixel i of a band are first[i] to first[i + 1].
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fringetrace.core import grown, jit, part
+
+
+@jit
+def average(first, weight, field, mean, mutual):
+    """Weighted means over the samples of each pixel of the fields, and of E_m conj(E_n)."""
+    groups = len(field)
+    for pixel in range(len(first) - 1):
+        for m in range(groups):
+            total = 0.0j
+            for k in range(first[pixel], first[pixel + 1]):
+                total += weight[k] * field[m, k]
+            mean[m, pixel] = total
+            for n in range(m, groups):
+                real, imaginary = 0.0, 0.0
+                for k in range(first[pixel], first[pixel + 1]):
+                    one, other = field[m, k], field[n, k]
+                    real += weight[k] * (one.real * other.real + one.imag * other.imag)
+                    imaginary += weight[k] * (one.imag * other.real - one.real * other.imag)
+                mutual[m, n, pixel] = complex(real, imaginary)
+                mutual[n, m, pixel] = complex(real, -imaginary)
+
+
+@jit
+def lattice(order, columns, top, nodes, weights, first, x, y, weight):
+    """Gauss points of the pixels of a band: order[i] x order[i] of them in pixel i, none where it is 0.
+
+    `nodes`, `weights` are tables by order, on [0, 1].
+    """
+    for pixel in range(len(order)):
+        n = order[pixel]
+        row, column = top + pixel // columns, pixel % columns
+        k = first[pixel]
+        for i in range(n):
+            for j in range(n):
+                x[k], y[k] = column + nodes[n, j], row + nodes[n, i]
+                weight[k] = weights[n, i] * weights[n, j]
+                k += 1
+
+
+@jit
+def crossed(segments, rows, columns):
+    """Pixels that segments cross: (pixel, segment) pairs. Segments are x, y, x, y in pixels."""
+    slack = 1e-6
+    pairs = np.empty((4 * len(segments) + 64, 2), np.int64)
+    count = 0
+    for segment in range(len(segments)):
+        ax, ay, bx, by = segments[segment]
+        if ay > by:
+            ax, ay, bx, by = bx, by, ax, ay
+        below = min(max(np.floor(ay - slack), 0.0), float(rows))
+        above = min(max(np.floor(by + slack), -1.0), rows - 1.0)
+        for row in range(int(below), int(above) + 1):
+            rise = by - ay
+            low = min(max((row - slack - ay) / rise, 0.0), 1.0) if rise > slack else 0.0
+            high = min(max((row + 1.0 + slack - ay) / rise, 0.0), 1.0) if rise > slack else 1.0
+            x0, x1 = ax + low * (bx - ax), ax + high * (bx - ax)
+            left = min(max(np.floor(min(x0, x1) - slack), 0.0), float(columns))
+            right = min(max(np.floor(max(x0, x1) + slack), -1.0), columns - 1.0)
+            for column in range(int(left), int(right) + 1):
+                if count == len(pairs):
+                    pairs = grown(pairs)
+                pairs[count, 0], pairs[count, 1] = row * columns + column, segment
+                count += 1
+    return pairs[:count]
+
+
+# A polygon is cut where a line leaves more than this on both sides, in pixels.
+SLIVER = 1e-8
+# Corners of a piece, and pieces of a part of a pixel, at most.
+CORNERS, PIECES = 32, 1024
+
+
+@part
+def clip(polygon, corners, a, b, c, sign, result):
+    """The part of a convex polygon where sign (a x + b y - c) >= 0; its corners."""
+    count = 0
+    for i in range(corners):
+        j = i + 1 if i + 1 < corners else 0
+        here = sign * (a * polygon[i, 0] + b * polygon[i, 1] - c)
+        there = sign * (a * polygon[j, 0] + b * polygon[j, 1] - c)
+        if here >= 0.0:
+            result[count, 0], result[count, 1] = polygon[i, 0], polygon[i, 1]
+            count += 1
+        if (here > 0.0 and there < 0.0) or (here < 0.0 and there > 0.0):
+            f = here / (here - there)
+            result[count, 0] = polygon[i, 0] + f * (polygon[j, 0] - polygon[i, 0])
+            result[count, 1] = polygon[i, 1] + f * (polygon[j, 1] - polygon[i, 1])
+            count += 1
+    return count
+
+
+@jit
+def shatter(x, y, size, lines, segments, polygons, corners):
+    """Cut a square by the lines of some segments; how many pieces."""
+    for i in range(4):
+        polygons[0, i, 0] = x + (size if i == 1 or i == 2 else 0.0)
+        polygons[0, i, 1] = y + (size if i >= 2 else 0.0)
+    corners[0] = 4
+    count = 1
+    spare = np.empty((CORNERS, 2))
+    for line in lines:
+        ax, ay, bx, by = segments[line]
+        length = np.hypot(bx - ax, by - ay)
+        if length == 0.0:
+            continue
+        a, b = (ay - by) / length, (bx - ax) / length
+        c = a * ax + b * ay
+        for q in range(count):
+            most, least = -np.inf, np.inf
+            for i in range(corners[q]):
+                height = a * polygons[q, i, 0] + b * polygons[q, i, 1] - c
+                most, least = max(most, height), min(least, height)
+            if not (most > SLIVER and least < -SLIVER) or count == PIECES or corners[q] + 2 > CORNERS:
+                continue
+            corners[count] = clip(polygons[q], corners[q], a, b, c, 1.0, polygons[count])
+            corners[q] = clip(polygons[q], corners[q], a, b, c, -1.0, spare)
+            for i in range(corners[q]):
+                polygons[q, i, 0], polygons[q, i, 1] = spare[i, 0], spare[i, 1]
+            count += 1
+    return count
+
+
+@jit
+def cut(pixels, parts, begin, lines, segments, columns, rule):
+    """Sample points of pixels that edges cross: columns x, y, weight, and a point sure of its side.
+
+    Each pixel, in parts x parts squares, is cut by the lines of its segments into convex pieces,
+    those into triangles with the points of `rule`: barycentric a, b, c and weight. Also returns how
+    many points each pixel has.
+    """
+    points = np.empty((64 * len(pixels) + 64, 5))
+    counts = np.zeros(len(pixels), np.int64)
+    polygons, corners = np.empty((PIECES, CORNERS, 2)), np.empty(PIECES, np.int64)
+    total = 0
+    for n in range(len(pixels)):
+        row, column = pixels[n] // columns, pixels[n] % columns
+        size = 1.0 / parts[n]
+        for square in range(parts[n] * parts[n]):
+            pieces = shatter(
+                column + (square % parts[n]) * size, row + (square // parts[n]) * size, size,
+                lines[begin[n] : begin[n + 1]], segments, polygons, corners,
+            )  # fmt: skip
+            for q in range(pieces):
+                p = polygons[q]
+                for i in range(1, corners[q] - 1):
+                    double = (p[i, 0] - p[0, 0]) * (p[i + 1, 1] - p[0, 1])
+                    double -= (p[i, 1] - p[0, 1]) * (p[i + 1, 0] - p[0, 0])
+                    if total + len(rule) > len(points):
+                        points = grown(points)
+                    for k in range(len(rule)):
+                        for axis in range(2):
+                            points[total, axis] = (
+                                rule[k, 0] * p[0, axis]
+                                + rule[k, 1] * p[i, axis]
+                                + rule[k, 2] * p[i + 1, axis]
+                            )
+                            points[total, 3 + axis] = (p[0, axis] + p[i, axis] + p[i + 1, axis]) / 3.0
+                        points[total, 2] = 0.5 * abs(double) * rule[k, 3]
+                        total += 1
+                        counts[n] += 1
+    return points[:total], counts

@@ -1,0 +1,15 @@
+from . import forms as forms, meshes as meshes, shapes as shapes
+from .facet_sag import standoff as standoff
+from .forms import Conic as Conic, Cylinder as Cylinder, Form as Form, Sphere as Sphere
+from .implicit import Fit as Fit, LevelFit as LevelFit, Meeting as Meeting, dot as dot
+from .mesh import Mesh as Mesh, as_mesh as as_mesh
+from .meshes import interpolate_height as interpolate_height
+from .pn_triangles import Patches as Patches
+from .shapes import (
+    height_map as height_map,
+    icosphere as icosphere,
+    plate as plate,
+    rod_lattice as rod_lattice,
+)
+from .triangles import IndexArray as IndexArray, breadth as breadth, weld as weld
+from .zygo import write_height_map as write_height_map

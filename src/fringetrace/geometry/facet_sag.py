@@ -1,0 +1,108 @@
+"""How far facets stand off the smooth surface that they may stand for, told from their neighbours."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import FloatArray, unit
+from fringetrace.geometry.implicit import dot
+from fringetrace.geometry.triangles import weld
+
+IndexArray = npt.NDArray[np.int64]
+
+# Facets whose normals are more than 30 degrees (cosine) apart meet in an edge of the part.
+SHARP = 0.8660254037844387
+
+
+def standoff(
+    vertices: FloatArray, faces: IndexArray, chosen: IndexArray, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Height of the smooth surface behind the facets over points on them, and how it leans there.
+
+    Along each side of a facet the surface bends as the normals at its two ends say; each is the
+    mean over the facets around the vertex that make no sharp edge with this one. The lesser of the
+    two counts, and none if they bend apart: a crease between flat parts, where only one end leans,
+    is the part's own. Linear interpolation of a quadric misses sum of w_i w_j k_ij s_ij^2 / 2
+    (w barycentric, k curvature along the side of length s).
+
+    Parameters
+    ----------
+    vertices : (v, 3) float64, metres
+    faces : (f, 3) int64
+    chosen : (n,) int64
+        The facet of each point.
+    points : (n, 3) float64, metres
+
+    Returns
+    -------
+    height : (n,) float64, metres
+        Positive on the front. 0 on flat parts, and along the rim of the mesh.
+    lean : (n, 3) float64
+        Its gradient along the facet: the normal of the surface less that of the facet is -lean.
+    """
+    used, place = np.unique(chosen, return_inverse=True)
+    vertices, faces, used = _around(vertices, faces, used)
+    corners = vertices[faces[used]]
+    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    lean = _corner_normals(vertices, faces, used) - normal[:, None]
+    corners, normal, lean = corners[place], normal[place], lean[place]
+    weight, rise = _barycentric(corners, normal, points)
+    height, slope = np.zeros(len(points)), np.zeros_like(points)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        side = corners[:, j] - corners[:, i]
+        one, other = -dot(lean[:, i], side), dot(lean[:, j], side)
+        bend = np.where(one * other > 0.0, np.sign(one) * np.minimum(np.abs(one), np.abs(other)), 0.0)
+        height += bend * weight[:, i] * weight[:, j]
+        slope += bend[:, None] * (weight[:, i, None] * rise[:, j] + weight[:, j, None] * rise[:, i])
+    return height, slope
+
+
+def _around(
+    vertices: FloatArray, faces: IndexArray, used: IndexArray
+) -> tuple[FloatArray, IndexArray, IndexArray]:
+    """The mesh about some of its faces, welded; and which faces those are in it."""
+    # files may give each facet vertices of its own: what is one vertex is told by its place
+    at = np.zeros(len(vertices), dtype=np.bool_)
+    at[faces[used]] = True
+    low, high = vertices[at].min(axis=0), vertices[at].max(axis=0)
+    within = ((vertices >= low) & (vertices <= high)).all(axis=1)
+    near = np.flatnonzero(within[faces].any(axis=1))
+    kept, compact = np.unique(faces[near], return_inverse=True)
+    welded, some = weld(vertices[kept], compact.reshape(-1, 3).astype(np.int64))
+    return welded, some, np.searchsorted(near, used)
+
+
+def _corner_normals(vertices: FloatArray, faces: IndexArray, used: IndexArray) -> FloatArray:
+    """Normals (n, 3, 3) at the corners of some faces, over the facets that go on smoothly from each."""
+    corners = vertices[faces]
+    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    order = np.argsort(faces.ravel(), kind="stable")
+    ends = np.searchsorted(faces.ravel()[order], np.arange(len(vertices) + 1))
+    mine = faces[used].ravel()
+    count = ends[mine + 1] - ends[mine]
+    owner = np.repeat(np.arange(len(mine)), count)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    face, corner = np.divmod(order[ends[mine][owner] + step], 3)
+    goes_on = dot(normal[face], normal[used[owner // 3]]) > SHARP
+    face, corner, owner = face[goes_on], corner[goes_on], owner[goes_on]
+    # exact on a sphere: N. Max, J. Graphics Tools 4 (1999) 1
+    here = corners[face, corner]
+    one, other = corners[face, corner - 2] - here, corners[face, corner - 1] - here
+    share = np.cross(one, other) / (dot(one, one) * dot(other, other))[:, None]
+    columns = [np.bincount(owner, share[:, axis], len(mine)) for axis in range(3)]
+    total = np.stack(columns, axis=1).astype(np.float64)
+    return unit(total).reshape(-1, 3, 3)
+
+
+def _barycentric(
+    corners: FloatArray, normal: FloatArray, points: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Weights (n, 3) of points in triangles, and their gradients (n, 3, 3)."""
+    rise = []
+    for k in range(3):
+        opposite = corners[:, k - 1] - corners[:, k - 2]
+        across = np.cross(normal, opposite)
+        rise.append(across / dot(across, corners[:, k] - corners[:, k - 2])[:, None])
+    weight = [dot(rise[k], points - corners[:, k - 2]) for k in range(3)]
+    return np.clip(np.stack(weight, axis=1), 0.0, 1.0), np.stack(rise, axis=1)

@@ -1,0 +1,353 @@
+"""The exact surface behind the facets: the mesh finds a hit, the form decides where it is.
+
+Each form fits itself to a mesh; the fit moves hits along their rays onto the form and tells the
+true normal there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import (
+    ROUNDED,
+    FloatArray,
+    checked_direction,
+    checked_rotation,
+    checked_vector,
+    component,
+    unit,
+)
+from fringetrace.geometry.implicit import EPSILON, Fit, dot, fit_level
+from fringetrace.geometry.pn_triangles import patched, vertex_normals
+
+# Past its equator by no more than this, in radii squared, a conic is at it.
+EQUATOR = 4.0 * EPSILON
+
+
+class Form(Protocol):
+    """Anything that can be fitted to a mesh."""
+
+    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+        """Get to know the mesh, (v, 3) metres and (f, 3)."""
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
+        """The form turned about the origin, then shifted; as `Mesh.moved`."""
+
+
+def _positive(value: float, what: str) -> float:
+    if isinstance(value, (str, bool)) or not (np.isfinite(value) and value > 0.0):
+        raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
+    return float(value)
+
+
+def _turned(vector: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
+    return vector if turn is None else np.asarray(checked_rotation(turn, "turn") @ vector, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """A sphere.
+
+    Parameters
+    ----------
+    centre : (3,) metres
+    radius : float, metres
+
+    Raises
+    ------
+    ValueError
+        If the radius is not a positive length.
+    """
+
+    centre: FloatArray
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", checked_vector(self.centre, "Sphere centre"))
+        object.__setattr__(self, "radius", _positive(self.radius, "Sphere radius"))
+
+    def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(rho^2 - r^2) / 2r, the distance from the surface near it; see `Level`."""
+        spoke = (point - self.centre) / self.radius
+        value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
+        return value, spoke, np.full(len(point), 1.0 / self.radius)
+
+    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+        """The sphere on a mesh; see `Form`."""
+        return fit_level(self, vertices, faces, complete=True)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Sphere:
+        """The sphere turned about the origin, then shifted; as `Mesh.moved`."""
+        return Sphere(_turned(self.centre, turn) + checked_vector(offset, "offset"), self.radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder:
+    """A circular cylinder without ends.
+
+    Parameters
+    ----------
+    point : (3,) metres
+        Any point of the axis.
+    axis : (3,)
+    radius : float, metres
+
+    Raises
+    ------
+    ValueError
+        If the axis has no length, or the radius is not a positive length.
+    """
+
+    point: FloatArray
+    axis: FloatArray
+    radius: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "point", checked_vector(self.point, "Cylinder point"))
+        object.__setattr__(self, "axis", checked_direction(self.axis, "Cylinder axis"))
+        object.__setattr__(self, "radius", _positive(self.radius, "Cylinder radius"))
+
+    def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """(rho^2 - r^2) / 2r, the distance from the surface near it; see `Level`."""
+        offset = point - self.point
+        spoke = (offset - np.outer(component(offset, self.axis), self.axis)) / self.radius
+        value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
+        return value, spoke, (1.0 - component(direction, self.axis) ** 2) / self.radius
+
+    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+        """The cylinder on a mesh; see `Form`."""
+        return fit_level(self, vertices, faces, complete=True)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Cylinder:
+        """The cylinder turned about the origin, then shifted; as `Mesh.moved`."""
+        point = _turned(self.point, turn) + checked_vector(offset, "offset")
+        return Cylinder(point, _turned(self.axis, turn), self.radius)
+
+
+@dataclass(frozen=True, eq=False)
+class Conic:
+    """A conic of revolution, with aspheric terms.
+
+    Height over the vertex plane at a distance r from the axis:
+    z = c r^2 / (1 + sqrt(1 - (1 + k) c^2 r^2)) + a_0 r^4 + a_1 r^6 + ..., c = 1 / radius.
+
+    Parameters
+    ----------
+    vertex : (3,) metres
+    axis : (3,)
+        Direction of positive heights.
+    radius : float, metres
+        Of curvature at the vertex; positive if the surface bends towards the axis' direction,
+        infinite for a plane.
+    conic : float
+        k = -eccentricity^2: 0 sphere, -1 parabola, below -1 hyperbola, above -1 ellipse.
+    terms : (a_0, a_1, ...), m^-3, m^-5, ...
+
+    Raises
+    ------
+    ValueError
+        For an axis without length, a radius of 0, numbers that are not finite.
+    """
+
+    vertex: FloatArray
+    axis: FloatArray
+    radius: float
+    conic: float = 0.0
+    terms: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "vertex", checked_vector(self.vertex, "Conic vertex"))
+        object.__setattr__(self, "axis", checked_direction(self.axis, "Conic axis"))
+        if np.isnan(self.radius) or self.radius == 0.0:
+            raise ValueError(f"Conic radius: expected a length in metres other than 0, got {self.radius!r}")
+        object.__setattr__(self, "terms", tuple(float(a) for a in self.terms))
+        if not np.isfinite([self.conic, *self.terms]).all():
+            raise ValueError(
+                f"Conic: expected a finite conic constant and terms, got {self.conic!r} and {self.terms!r}"
+            )
+
+    def sag(self, square: FloatArray) -> FloatArray:
+        """Height of the surface over its vertex plane.
+
+        Parameters
+        ----------
+        square : float64, any shape, m^2
+            Distance from the axis, squared.
+
+        Returns
+        -------
+        float64, same shape, metres
+            NaN beyond the equator.
+        """
+        square, c = np.asarray(square, dtype=np.float64), 1.0 / self.radius
+        under = 1.0 - (1.0 + self.conic) * c * c * square
+        root = np.sqrt(np.where(under > -EQUATOR, np.maximum(under, 0.0), np.nan))
+        height = c * square / (1.0 + root)
+        for i, a in enumerate(self.terms):
+            height = height + a * square ** (i + 2)
+        return np.asarray(height, dtype=np.float64)
+
+    def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Height above the surface; z - (c r^2 + c (1 + k) z^2) / 2 without terms. See `Level`."""
+        c, k = 1.0 / self.radius, self.conic
+        offset = point - self.vertex
+        z, dz = component(offset, self.axis), component(direction, self.axis)
+        across = offset - np.outer(z, self.axis)
+        aside = direction - np.outer(dz, self.axis)
+        square = dot(across, across)
+        if not self.terms:
+            value = z - 0.5 * c * (square + (1.0 + k) * z * z)
+            gradient = np.outer(1.0 - (1.0 + k) * c * z, self.axis) - c * across
+            return value, gradient, -c * (dot(aside, aside) + (1.0 + k) * dz * dz)
+        root = np.sqrt(1.0 - (1.0 + k) * c * c * square)
+        first, second = 0.5 * c / root, 0.25 * (1.0 + k) * c**3 / root**3
+        for i, a in enumerate(self.terms):
+            power = i + 2
+            first = first + a * power * square ** (power - 1)
+            second = second + a * power * (power - 1) * square ** (power - 2)
+        bend = -2.0 * first * dot(aside, aside) - 4.0 * second * dot(across, aside) ** 2
+        return z - self.sag(square), self.axis - 2.0 * first[:, None] * across, bend
+
+    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+        """The conic on a mesh; see `Form`."""
+        return fit_level(self, vertices, faces, complete=not self.terms)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Conic:
+        """The conic turned about the origin, then shifted; as `Mesh.moved`."""
+        vertex = _turned(self.vertex, turn) + checked_vector(offset, "offset")
+        return Conic(vertex, _turned(self.axis, turn), self.radius, self.conic, self.terms)
+
+
+@dataclass(frozen=True, eq=False)
+class HeightField:
+    """Heights on a grid, with a bicubic spline between them; lies as the mesh of `shapes.height_map`.
+
+    Parameters
+    ----------
+    heights : (rows, columns) float64, metres
+        4 x 4 or more; rows along y, columns along x, centred on the z axis.
+    pitch : float, or (along x, along y), metres
+    offset : (3,) metres
+    turn : (3, 3), optional
+        Rotation applied before the offset, as in `Mesh.moved`.
+
+    Raises
+    ------
+    ValueError
+        For fewer than 4 x 4 heights, or some that are not finite; for a pitch that is not positive.
+    """
+
+    heights: FloatArray
+    pitch: float | tuple[float, float]
+    offset: FloatArray = (0.0, 0.0, 0.0)  # type: ignore[assignment]
+    turn: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        heights = np.array(self.heights, dtype=np.float64)
+        if heights.ndim != 2 or min(heights.shape) < 4 or not np.isfinite(heights).all():
+            raise ValueError(
+                f"HeightField heights: expected 4 x 4 finite numbers or more, got shape {heights.shape}"
+            )
+        both = self.pitch if isinstance(self.pitch, tuple) else (self.pitch, self.pitch)
+        pitch = tuple(_positive(value, "HeightField pitch") for value in both)
+        turn = np.eye(3) if self.turn is None else checked_rotation(self.turn, "HeightField turn")
+        object.__setattr__(self, "heights", heights)
+        object.__setattr__(self, "pitch", pitch)
+        object.__setattr__(self, "turn", turn)
+        object.__setattr__(self, "offset", checked_vector(self.offset, "HeightField offset"))
+
+    @cached_property
+    def spline(self) -> Any:
+        """The spline, of y and x."""
+        from scipy.interpolate import RectBivariateSpline
+
+        pitch_x, pitch_y = np.broadcast_to(self.pitch, 2)
+        rows, columns = self.heights.shape
+        y = (np.arange(rows) - 0.5 * (rows - 1)) * pitch_y
+        x = (np.arange(columns) - 0.5 * (columns - 1)) * pitch_x
+        return RectBivariateSpline(y, x, self.heights)
+
+    def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Height above the spline; see `Level`."""
+        turn = np.asarray(self.turn)
+        x, y, z = (component(point - self.offset, axis) for axis in turn.T)
+        dx, dy = (component(direction, axis) for axis in turn.T[:2])
+        x, y = np.nan_to_num(x), np.nan_to_num(y)
+        height = {
+            (i, j): self.spline.ev(y, x, dx=j, dy=i) for i in range(3) for j in range(3) if i + j <= 2
+        }  # by the number of derivatives along x and y
+        gradient = turn[:, 2] - np.outer(height[1, 0], turn[:, 0]) - np.outer(height[0, 1], turn[:, 1])
+        bend = -(height[2, 0] * dx * dx + 2.0 * height[1, 1] * dx * dy + height[0, 2] * dy * dy)
+        return z - height[0, 0], gradient, bend
+
+    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+        """The spline on a mesh; see `Form`."""
+        return fit_level(self, vertices, faces, complete=False)
+
+    def moved(
+        self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None
+    ) -> HeightField:
+        """The height field turned about the origin, then shifted; as `Mesh.moved`."""
+        place = _turned(self.offset, turn) + checked_vector(offset, "offset")
+        own = np.asarray(self.turn)
+        both = own if turn is None else checked_rotation(turn, "turn") @ own
+        return HeightField(self.heights, self.pitch, place, both)
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A curved patch over each face, from the normals at the vertices: for a mesh of a smooth part.
+
+    Hits are off the part that was meant by the fourth power of the length of the facets' sides where
+    the normals are right, the third at worst; facets themselves, by the second.
+
+    Parameters
+    ----------
+    normals : (v, 3), optional
+        Normals at the vertices, to the front; None: from the faces around each vertex.
+
+    Raises
+    ------
+    ValueError
+        If normals are not rows of three finite numbers; at a `Surface`, if there is not one for each
+        vertex, faces are not wound alike, or the mesh has sharp edges.
+    """
+
+    normals: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if self.normals is None:
+            return
+        normals = np.array(self.normals, dtype=np.float64)
+        if (
+            normals.ndim != 2
+            or normals.shape[1] != 3
+            or not (np.isfinite(normals).all() and normals.any(1).all())
+        ):
+            raise ValueError(
+                f"Smooth normals: expected directions of shape (v, 3), got shape {normals.shape}"
+            )
+        with np.errstate(over="ignore", under="ignore"):
+            rough = np.abs(np.linalg.norm(normals, axis=1) - 1.0) > ROUNDED
+        normals[rough] = unit(normals[rough])
+        object.__setattr__(self, "normals", normals)
+
+    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+        """Patches over a mesh; see `Form`."""
+        normals = vertex_normals(vertices, faces) if self.normals is None else self.normals
+        if len(normals) != len(vertices):
+            raise ValueError(
+                f"Smooth normals: expected {len(vertices)}, one for each vertex, got {len(normals)}"
+            )
+        return patched(vertices, faces, normals)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
+        """The normals turned; as `Mesh.moved`."""
+        if self.normals is None or turn is None:
+            return self
+        return Smooth(np.asarray(self.normals @ checked_rotation(turn, "turn").T))

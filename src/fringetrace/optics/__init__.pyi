@@ -1,0 +1,28 @@
+from . import (
+    birefringent as birefringent,
+    elements as elements,
+    films as films,
+    gratings as gratings,
+    interfaces as interfaces,
+    materials as materials,
+    phase_plates as phase_plates,
+    polarisers as polarisers,
+)
+from .birefringent import ShearPlate as ShearPlate
+from .elements import Branch as Branch, Element as Element, Index as Index, Meeting as Meeting
+from .film_kernels import bare as bare, coated as coated, shares as shares, stacks as stacks
+from .films import Film as Film, coefficients as coefficients
+from .interfaces import (
+    Absorber as Absorber,
+    BeamSplitter as BeamSplitter,
+    Dielectric as Dielectric,
+    Interface as Interface,
+    Metal as Metal,
+    Mirror as Mirror,
+    refracted as refracted,
+)
+from .materials.material import Material as Material
+from .materials.named_materials import VACUUM as VACUUM, as_material as as_material
+from .phase_plates import PhasePlate as PhasePlate
+from .polarisers import Polariser as Polariser, Retarder as Retarder, wave_plate as wave_plate
+from .pupils import Pupil as Pupil

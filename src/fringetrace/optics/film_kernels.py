@@ -1,0 +1,217 @@
+"""Compiled loops of bare faces, and of thin films by their characteristic matrices: amplitudes."""
+
+from __future__ import annotations
+
+import cmath
+
+import numpy as np
+
+from fringetrace.core import jit, part
+
+# A wave fades along a boundary if so much of its squared wave number there is imaginary: more than rounding.
+ASLANT = 1e-9
+
+
+@jit
+def normal(index, sine2):
+    """Normal part kz / k0 = sqrt(n^2 - sine2) of the wave that goes on: Im > 0, or Re > 0 where it is real.
+
+    Waves that come out of an absorbing medium may grow along z, as they are damped along x: there
+    the branch with Re + Im > 0 is the one that goes on into that of a transparent medium.
+    """
+    root = cmath.sqrt(index * index - sine2)
+    return -root if root.real + root.imag < 0.0 else root
+
+
+@jit
+def across(index, sine2, thickness, k0):
+    """Matrix of a layer, times p = exp(i k0 kz d): its diagonal, i sin / kz, i kz sin, and p.
+
+    In terms of p, which cannot overflow, and of a quotient that stays finite at kz = 0.
+    """
+    square = index * index - sine2
+    kz = cmath.sqrt(square)
+    kz = -kz if kz.imag < 0.0 else kz
+    delta = k0 * thickness * kz
+    p = cmath.exp(1j * delta)
+    if abs(delta) > 0.5:
+        quotient = 0.5 * (1.0 - p * p) / kz
+    elif delta != 0.0:
+        quotient = -1j * p * cmath.sin(delta) / kz
+    else:
+        quotient = -1j * k0 * thickness * p
+    return 0.5 * (1.0 + p * p), quotient, square * quotient, p
+
+
+@jit
+def stack(sine2, first, layers, thickness, last, k0):
+    """Amplitudes (rs, rp, ts, tp) of a stack of layers between two half spaces.
+
+    sine2 = (n sin(theta))^2 of the first half space, the same all through the stack; `first`,
+    `last` and `layers` (m,) are complex indices, in the order that light meets them; `thickness`
+    (m,) in metres; k0 = 2 pi / wavelength. Goes back through the stack by the tangential fields
+    (E and H): each layer's matrix is scaled by exp(i k0 kz d), and fields are by their size, so
+    that nothing overflows, however thick or many the layers; |r| is good to some 1e-16 a layer.
+    """
+    kz1, kz2 = normal(first, sine2), normal(last, sine2)
+    if len(layers) == 0 and first == last:
+        return 0j, 0j, 1.0 + 0j, 1.0 + 0j
+    es, hs, gs = 1.0 + 0j, kz2, 1.0 + 0j
+    hp, ep, gp = 1.0 + 0j, kz2 / (last * last), 1.0 + 0j
+    for j in range(len(layers) - 1, -1, -1):
+        middle, quotient, product, p = across(layers[j], sine2, thickness[j], k0)
+        w = layers[j] * layers[j]
+        es, hs = middle * es + quotient * hs, product * es + middle * hs
+        hp, ep = middle * hp + w * quotient * ep, product / w * hp + middle * ep
+        size = 1.0 / (abs(es) + abs(hs))
+        es, hs, gs = es * size, hs * size, gs * (p * size)
+        size = 1.0 / (abs(hp) + abs(ep))
+        hp, ep, gp = hp * size, ep * size, gp * (p * size)
+    q1 = kz1 / (first * first)
+    s, c = kz1 * es + hs, q1 * hp + ep
+    return (
+        (kz1 * es - hs) / s,
+        (q1 * hp - ep) / c,
+        2.0 * kz1 / s * gs,
+        2.0 * q1 / c * gp * (first / last),
+    )
+
+
+@jit
+def carried(sine2, first, last):
+    """Power across a face or film for |t|^2 = 1, of s and of p light: T = carried * |t|^2.
+
+    The normal part of the Poynting vector behind, by that before; T = 0 where light is totally
+    reflected. If the first half space absorbs, R + T is not the whole (Byrnes, section 3).
+    """
+    kz1, kz2 = normal(first, sine2), normal(last, sine2)
+    s = kz2.real / kz1.real
+    before = (first * first * kz1.conjugate()).real / abs(first * first)
+    behind = (last * last * kz2.conjugate()).real / abs(last * last)
+    return s, behind / before
+
+
+@jit
+def stacks(sine2, first, layers, thickness, last, k0):
+    """`stack` for arrays (k,) of sine2, first, last, k0, and (k, m) of layers: (4, k) amplitudes."""
+    out = np.empty((4, len(sine2)), np.complex128)
+    for i in range(len(sine2)):
+        out[0, i], out[1, i], out[2, i], out[3, i] = stack(
+            sine2[i], first[i], layers[i], thickness, last[i], k0[i]
+        )
+    return out
+
+
+@jit
+def shares(sine2, first, last):
+    """`carried` for arrays (k,): (2, k)."""
+    out = np.empty((2, len(sine2)))
+    for i in range(len(sine2)):
+        out[0, i], out[1, i] = carried(sine2[i], first[i], last[i])
+    return out
+
+
+@part
+def forward(squared):
+    """Normal part of a wave vector from its square: the root that runs, or fades, forwards."""
+    root = np.sqrt(squared)
+    return -root if root.real + root.imag < 0.0 else root
+
+
+@part
+def flow(index, normal):
+    """Power through a boundary of s and of p light of unit amplitude: n cos, but in an absorbing medium."""
+    return normal.real, (index * (normal / index).conjugate()).real
+
+
+@part
+def shared(through, before):
+    """From amplitudes of E to those of power; nothing goes on where no power flows."""
+    return np.sqrt(through / before) if through > 0.0 and before > 0.0 else 0.0
+
+
+@part
+def fresnel(first, q1, last, q2):
+    """Fresnel's r_s, r_p, t_s, t_p, of E, from indices and normal parts n cos; signs as in `films`."""
+    a, b = last * last * q1, first * first * q2
+    s, p = 1.0 / (q1 + q2), 1.0 / (a + b)
+    return (q1 - q2) * s, (a - b) * p, 2.0 * q1 * s, 2.0 * first * last * q1 * p
+
+
+@part
+def clear(first, last, q):
+    """`bare` between media that do not absorb, from the real normal part before: real, but for phases."""
+    square = (last - first) * (last + first) + q * q
+    deep = np.sqrt(abs(square))
+    a, b = last * last * q, first * first * deep
+    if square >= 0.0:
+        s, p, root = 1.0 / (q + deep), 1.0 / (a + b), 2.0 * np.sqrt(q * deep)
+        ts, tp = root * s, first * last * root * p
+        return complex((q - deep) * s), complex((a - b) * p), complex(ts), complex(tp), complex(deep)
+    s, p = 1.0 / (q * q + deep * deep), 1.0 / (a * a + b * b)
+    rs = complex((q - deep) * (q + deep) * s, -2.0 * q * deep * s)
+    rp = complex((a - b) * (a + b) * p, -2.0 * a * b * p)
+    return rs, rp, 0j, 0j, complex(0.0, deep)
+
+
+@part
+def aslant(first, q1):
+    """Whether a wave fades along the boundary: never between parallel faces.
+
+    As an endless wave it might bring power along that is not in it; rays are to keep theirs.
+    """
+    return abs((q1 * q1 - first * first).imag) > ASLANT * abs(first * first)
+
+
+@part
+def bounded(r, t):
+    """Amplitudes of power with no more power than came; what is reflected goes first."""
+    size = r.real * r.real + r.imag * r.imag
+    rest, through = 1.0 - size, t.real * t.real + t.imag * t.imag
+    if rest <= 0.0:
+        return r / np.sqrt(size), 0j
+    return r, t * np.sqrt(rest / through) if through > rest else t
+
+
+@part
+def bare(first, last, q1):
+    """Amplitudes of power of a bare boundary, r_s, r_p, t_s, t_p, and the normal part behind."""
+    if first.imag == 0.0 and last.imag == 0.0 and q1.imag == 0.0 and q1.real > 0.0 and first != last:
+        return clear(first.real, last.real, q1.real)
+    q2 = beneath(first, last, q1)
+    rs, rp, ts, tp = fresnel(first, q1, last, q2)
+    s, p = powers(first, q1, last, q2)
+    ts, tp = ts * s, tp * p
+    if aslant(first, q1):
+        (rs, ts), (rp, tp) = bounded(rs, ts), bounded(rp, tp)
+    return rs, rp, ts, tp, q2
+
+
+@part
+def beneath(first, last, q1):
+    """Normal part of the wave vector behind a boundary."""
+    return q1 if first == last else forward((last - first) * (last + first) + q1 * q1)
+
+
+@part
+def powers(first, q1, last, q2):
+    """From amplitudes of E behind a boundary to those of power, of s and of p light."""
+    s, p = flow(first, q1)
+    through_s, through_p = flow(last, q2)
+    return shared(through_s, s), shared(through_p, p)
+
+
+@jit
+def coated(film, surface, front, first, last, q1, k0):
+    """`bare` of a boundary with a film on it, met from the front or from the back."""
+    q2 = beneath(first, last, q1)
+    begin, indices, thickness, backwards = film
+    a, b = begin[surface], begin[surface + 1]
+    layers = indices[a:b] if front else backwards[0][a:b]
+    depth = thickness[a:b] if front else backwards[1][a:b]
+    rs, rp, ts, tp = stack(first * first - q1 * q1, first, layers, depth, last, k0)
+    s, p = powers(first, q1, last, q2)
+    ts, tp = ts * s, tp * p
+    if aslant(first, q1):
+        (rs, ts), (rp, tp) = bounded(rs, ts), bounded(rp, tp)
+    return rs, rp, ts, tp, q2

@@ -1,0 +1,31 @@
+from .dispersion import Formula as Formula, Table as Table
+from .material import (
+    Material as Material,
+    absorbing as absorbing,
+    cauchy as cauchy,
+    constant as constant,
+    sellmeier as sellmeier,
+    tabulated as tabulated,
+)
+from .named_materials import (
+    AIR as AIR,
+    ALUMINIUM as ALUMINIUM,
+    BK7 as BK7,
+    CALCITE_E as CALCITE_E,
+    CALCITE_O as CALCITE_O,
+    CHITIN as CHITIN,
+    FUSED_SILICA as FUSED_SILICA,
+    GOLD as GOLD,
+    KERATIN as KERATIN,
+    MELANIN as MELANIN,
+    NAMED as NAMED,
+    QUARTZ_E as QUARTZ_E,
+    QUARTZ_O as QUARTZ_O,
+    SF11 as SF11,
+    SILVER as SILVER,
+    VACUUM as VACUUM,
+    WATER as WATER,
+    as_material as as_material,
+    load as load,
+    named as named,
+)

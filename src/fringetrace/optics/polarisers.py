@@ -1,0 +1,266 @@
+"""Elements that act on polarisation: polariser, retarder, and any Jones matrix.
+
+The retarder's sign is fixed here: the component along its axis goes as exp(+i retardance), the one across
+as 1. With fields exp(-i w t) a positive retardance delays it: the axis is the slow one, as the optic axis
+of a positive crystal (n_e > n_o).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import ComplexArray, FloatArray, checked_direction
+from fringetrace.optics.elements import (
+    Branch,
+    Index,
+    Meeting,
+    Waves,
+    across,
+    asked,
+    checked_index,
+    checked_length,
+    checked_number,
+    dot,
+    index_at,
+    scaled,
+    turned,
+    vectors_of,
+)
+
+# A passive plate may not send on more power than it got; rounding is allowed for.
+PASSIVE = 1.0 + 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Polariser:
+    """Lets the component along its axis pass, and absorbs the one across.
+
+    Parameters
+    ----------
+    axis : (3,)
+        Of transmission. Rays see its part across them; one along the axis counts as crossed.
+    extinction : float
+        Power that passes crossed, relative to that which passes parallel, 0 to 1.
+
+    Raises
+    ------
+    ValueError
+        If the axis is no direction, or the extinction not from 0 to 1.
+    """
+
+    axis: FloatArray
+    extinction: float = 0.0
+
+    waves: ClassVar[Waves] = "plane"
+    branches: ClassVar[int] = 1
+    polarised: ClassVar[bool] = True
+    chromatic: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", checked_direction(self.axis, "Polariser axis"))
+        if not 0.0 <= checked_number(self.extinction, "Polariser extinction") <= 1.0:
+            raise ValueError(f"Polariser extinction: expected a number from 0 to 1, got {self.extinction!r}")
+
+    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+        """The component along the axis; see `Element`."""
+        return (Branch(weighed(meeting, "Polariser", self.axis, 1.0, self.extinction**0.5)),)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Polariser:
+        """The polariser turned; as `Mesh.moved`."""
+        return replace(self, axis=turned(self.axis, turn))
+
+
+@dataclass(frozen=True, eq=False)
+class Retarder:
+    """Delays the component along its axis against the one across.
+
+    Parameters
+    ----------
+    axis : (3,)
+        The slow axis, if the retardance is positive. Rays see its part across them.
+    retardance : float or callable, radians
+        A number, or a function of the wavelength in metres.
+    design : float, metres, optional
+        Wavelength of a retardance given as a number, which goes as design / wavelength elsewhere
+        (a plate whose birefringence does not disperse). None: the same at all wavelengths.
+
+    Raises
+    ------
+    ValueError
+        If the retardance is neither a finite number nor a function, the design no length, or both are given
+        where the retardance is a function.
+    """
+
+    axis: FloatArray
+    retardance: float | Callable[[float], float]
+    design: float | None = None
+
+    waves: ClassVar[Waves] = "plane"
+    branches: ClassVar[int] = 1
+    polarised: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", checked_direction(self.axis, "Retarder axis"))
+        if not callable(self.retardance):
+            checked_number(self.retardance, "Retarder retardance")
+        elif self.design is not None:
+            raise ValueError(
+                f"Retarder design: expected None beside a function of the wavelength, got {self.design}"
+            )
+        if self.design is not None:
+            checked_length(self.design, "Retarder design")
+
+    @property
+    def chromatic(self) -> bool:
+        """Whether the retardance depends on the wavelength."""
+        return callable(self.retardance) or self.design is not None
+
+    def at(self, wavelength: float | None) -> float:
+        """Retardance at a wavelength.
+
+        Parameters
+        ----------
+        wavelength : float, metres, or None
+
+        Returns
+        -------
+        float, radians
+
+        Raises
+        ------
+        ValueError
+            If it depends on the wavelength, and that is None.
+        """
+        if callable(self.retardance):
+            return float(self.retardance(asked(wavelength, "Retarder")))
+        return self.retardance * (self.design / asked(wavelength, "Retarder") if self.design else 1.0)
+
+    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+        """Both components, one of them delayed; see `Element`."""
+        delay = complex(np.exp(1j * self.at(meeting.wavelength)))
+        return (Branch(weighed(meeting, "Retarder", self.axis, delay, 1.0)),)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Retarder:
+        """The retarder turned; as `Mesh.moved`."""
+        return replace(self, axis=turned(self.axis, turn))
+
+
+@dataclass(frozen=True)
+class Birefringence:
+    """Retardance of a crystal plate, 2 pi (n_e - n_o) thickness / wavelength: a function of the wavelength.
+
+    Parameters
+    ----------
+    ordinary, extraordinary : float or callable
+        Indices, or functions of the wavelength in metres.
+    thickness : float, metres
+
+    Raises
+    ------
+    ValueError
+        If an index or the thickness is not positive.
+    """
+
+    ordinary: Index
+    extraordinary: Index
+    thickness: float
+
+    def __post_init__(self) -> None:
+        checked_index(self.ordinary, "Birefringence ordinary index")
+        checked_index(self.extraordinary, "Birefringence extraordinary index")
+        checked_length(self.thickness, "Birefringence thickness")
+
+    def __call__(self, wavelength: float) -> float:
+        """Retardance in radians at a wavelength in metres."""
+        difference = index_at(self.extraordinary, wavelength, "") - index_at(self.ordinary, wavelength, "")
+        return 2.0 * np.pi * difference * self.thickness / wavelength
+
+
+def wave_plate(axis: npt.ArrayLike, waves: float, design: float | None = None) -> Retarder:
+    """A retarder by waves: 1/2 half-wave, 1/4 quarter-wave, 10.25 a quarter-wave plate of tenth order.
+
+    Parameters
+    ----------
+    axis : (3,)
+        Slow axis.
+    waves : float
+    design : float, metres, optional
+        The wavelength at which it has that many waves; None: at all.
+
+    Returns
+    -------
+    Retarder
+    """
+    retardance = 2.0 * np.pi * checked_number(waves, "wave_plate waves")
+    return Retarder(checked_direction(axis, "wave_plate axis"), retardance, design)
+
+
+@dataclass(frozen=True, eq=False)
+class JonesPlate:
+    """Any linear action on the two components of a field that absorbs or keeps power.
+
+    Parameters
+    ----------
+    matrix : (2, 2) complex
+        On the components (along the axis, along `direction` x axis), for light that goes against the
+        surface's normal. Light from behind meets the transposed matrix on the same two axes: reciprocity.
+    axis : (3,)
+        Rays see its part across them; a ray along the axis is blocked.
+
+    Raises
+    ------
+    ValueError
+        If the matrix is not (2, 2) and finite, or some state would gain power.
+    """
+
+    matrix: ComplexArray
+    axis: FloatArray
+
+    waves: ClassVar[Waves] = "plane"
+    branches: ClassVar[int] = 1
+    polarised: ClassVar[bool] = True
+    chromatic: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", _checked_matrix(self.matrix))
+        object.__setattr__(self, "axis", checked_direction(self.axis, "JonesPlate axis"))
+
+    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+        """The field times the matrix; see `Element`."""
+        field = vectors_of(meeting, "JonesPlate")
+        behind = dot(meeting.direction, meeting.normal) > 0.0
+        first = across(self.axis, meeting.direction)
+        second = scaled(np.cross(meeting.direction, first), np.where(behind, -1.0, 1.0))
+        a, b = dot(field, first), dot(field, second)
+        m = self.matrix
+        upper, lower = np.where(behind, m[1, 0], m[0, 1]), np.where(behind, m[0, 1], m[1, 0])
+        return (Branch(scaled(first, m[0, 0] * a + upper * b) + scaled(second, lower * a + m[1, 1] * b)),)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> JonesPlate:
+        """The plate turned; as `Mesh.moved`."""
+        return replace(self, axis=turned(self.axis, turn))
+
+
+def _checked_matrix(value: Any) -> ComplexArray:
+    try:
+        matrix = np.array(value, dtype=np.complex128)
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"JonesPlate matrix: expected 2 x 2 complex numbers, got {value!r}") from error
+    if matrix.shape != (2, 2) or not np.isfinite(matrix).all():
+        raise ValueError(f"JonesPlate matrix: expected 2 x 2 finite complex numbers, got {value!r}")
+    gain = float(np.linalg.norm(matrix, 2)) ** 2
+    if gain > PASSIVE:
+        raise ValueError(f"JonesPlate matrix: expected a passive one, gain up to 1, got {gain:.6g}")
+    return matrix
+
+
+def weighed(meeting: Meeting, what: str, axis: FloatArray, along: complex, rest: complex) -> ComplexArray:
+    """Fields with their component along an axis times one number, and the rest times another."""
+    field = vectors_of(meeting, what)
+    seen = across(axis, meeting.direction)
+    return np.asarray(rest * field + scaled(seen, (along - rest) * dot(field, seen)))

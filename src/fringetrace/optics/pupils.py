@@ -1,0 +1,54 @@
+"""The numerical aperture of an objective: which directions get through, wherever rays cross its plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import FloatArray, checked_direction
+from fringetrace.optics.elements import Branch, Meeting, Waves, checked_number, dot, scaled, turned, within
+
+
+@dataclass(frozen=True, eq=False)
+class Pupil:
+    """Lets rays pass whose direction is within a numerical aperture, and absorbs the rest.
+
+    Parameters
+    ----------
+    axis : (3,)
+        Of the objective, in the sense of travel or against it.
+    aperture : float
+        Numerical aperture: index times the sine of the angle to the axis.
+
+    Raises
+    ------
+    ValueError
+        If the axis is no direction, or the aperture not positive.
+    """
+
+    axis: FloatArray
+    aperture: float
+
+    # a plane wave has one direction: all of it passes, or none
+    waves: ClassVar[Waves] = "plane"
+    branches: ClassVar[int] = 1
+    polarised: ClassVar[bool] = False
+    chromatic: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", checked_direction(self.axis, "Pupil axis"))
+        if not checked_number(self.aperture, "Pupil aperture") > 0.0:
+            raise ValueError(f"Pupil aperture: expected a positive number, got {self.aperture!r}")
+
+    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+        """The light within the aperture; see `Element`."""
+        aside = within(meeting.direction, np.broadcast_to(self.axis, meeting.direction.shape))
+        passes = meeting.index**2 * dot(aside, aside) <= self.aperture**2
+        return (Branch(scaled(meeting.field, passes)),)
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Pupil:
+        """The pupil turned; as `Mesh.moved`."""
+        return replace(self, axis=turned(self.axis, turn))

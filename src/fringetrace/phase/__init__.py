@@ -1,0 +1,5 @@
+"""Interference fringes to wrapped phase, unwrapped phase and height; arrays in, arrays out."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

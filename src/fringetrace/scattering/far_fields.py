@@ -1,0 +1,196 @@
+"""What leaves a sample that is lit from one direction: rays traced once, and summed at a detector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelengths
+from fringetrace.field import TOLERANCE, spectrum
+from fringetrace.scattering.detectors import Detector, Pixels, everything, sides, towards
+from fringetrace.scattering.illumination import Setup
+from fringetrace.scene import Beam, Scene
+from fringetrace.tracing import Fate, Paths, Rays, needs, stream
+
+FATES = ("reflected", "transmitted", "missed", "absorbed", "truncated")
+# Rays whose sums are taken at once: 100 MB of paths.
+CHUNK = 2**17
+
+
+@dataclass(frozen=True, eq=False)
+class Far:
+    """What left a sample that was lit from one direction.
+
+    Attributes
+    ----------
+    amplitude : (theta, phi, parts, wavelength) complex128, m^2 (rays, where they have no area)
+        Sum of area * amplitude * exp(i k length) over the rays that arrive; of one number a ray, or
+        of s and p light, see `detectors.sides`. Powers of several parts add.
+    power : (theta, phi, wavelength) float64, m^2 (rays)
+        Sum of area * |amplitude|^2 over them.
+    rays : (theta, phi) int64
+        Their number.
+    shares : dict
+        Parts of the incident power by what became of it, see `FATES`; means over wavelengths.
+    incident : float, m^2 (rays)
+    """
+
+    amplitude: ComplexArray
+    power: FloatArray
+    rays: npt.NDArray[np.int64]
+    shares: dict[str, float]
+    incident: float
+
+
+def _shares(paths: Paths) -> FloatArray:
+    """Power by fate, in the order of `FATES`."""
+    power, left, met = np.abs(paths.amplitude) ** 2, paths.fate == Fate.LEFT, paths.bounces > 0
+    up = paths.direction[:, 2] > 0.0
+    ledger = paths.ledger()
+    unit = 1.0 if paths.area is None else paths.area
+    sums = [unit * power[left & which].sum() for which in (met & up, met & ~up, ~met)]
+    return np.array([*sums, ledger.absorbed, ledger.truncated])
+
+
+def _bands(scene: Scene, waves: FloatArray) -> list[tuple[float | None, slice]]:
+    """Wavelengths that one trace serves: all of them, or each its own where rays or amplitudes hang on it."""
+    if needs(scene) is None:
+        return [(None, slice(None))]
+    return [(float(wave), slice(i, i + 1)) for i, wave in enumerate(waves)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Adding:
+    """How paths are added up at a detector."""
+
+    setup: Setup
+    detector: Detector
+    method: str
+    wanted: npt.NDArray[np.bool_]
+    half_wave_loss: bool
+    tolerance: float
+
+    def chunk(
+        self, paths: Paths, start: float, waves: FloatArray
+    ) -> tuple[ComplexArray, FloatArray, npt.NDArray[np.int64]]:
+        """Amplitudes (theta, phi, parts, wavelength), powers and numbers (theta, phi) of some paths."""
+        size, centre = self.wanted.shape, np.asarray(self.setup.centre)
+        total = np.zeros((self.wanted.size, parts(paths.source), len(waves)), dtype=np.complex128)
+        power, count = np.zeros(self.wanted.size), np.zeros(self.wanted.size, dtype=np.int64)
+        unit = 1.0 if paths.area is None else paths.area
+        arrivals = self.detector.arrivals(paths, centre)
+        if self.method == "diffraction":
+            arrivals = everything(paths, self.detector, centre)
+        since = 0.0 if isinstance(self.detector, Pixels) else start
+        for i, (rows, length) in enumerate(arrivals):
+            count[i], power[i] = len(rows), unit * (np.abs(paths.amplitude[rows]) ** 2).sum()
+            if self.wanted.flat[i] and len(rows):
+                amplitude = self._seen(paths, rows, i)
+                total[i] = unit * spectrum(length - since, amplitude, waves, self.tolerance)
+        return total.reshape(*size, *total.shape[1:]), power.reshape(size), count.reshape(size)
+
+    def _seen(self, paths: Paths, rows: npt.NDArray[np.int64], place: int) -> ComplexArray:
+        """(parts, n) amplitudes of some paths, as seen from one of the detector's directions."""
+        amplitude = paths.amplitude[None, rows]
+        if paths.field is not None:
+            theta, phi = (
+                float(angles.flat[place])
+                for angles in np.meshgrid(self.detector.theta, self.detector.phi, indexing="ij")
+            )
+            amplitude = sides(towards(theta, phi), phi) @ paths.field[rows].T
+        if not self.half_wave_loss:
+            amplitude = np.where(paths.reflections[rows] % 2 == 1, -amplitude, amplitude)
+        return amplitude
+
+
+def parts(source: Beam | Rays) -> int:
+    """How many amplitudes light has: one, or those of s and p."""
+    return 1 if source.polarisation is None else 2
+
+
+def mean(fars: Sequence[Far]) -> Far:
+    """Light of several states that do not interfere: the mean of what left.
+
+    Parameters
+    ----------
+    fars : sequence of Far
+        Lit from the same direction by the same power.
+
+    Returns
+    -------
+    Far
+        Parts of the amplitude of all, so scaled that their powers add up to the mean.
+    """
+    if len(fars) == 1:
+        return fars[0]
+    return Far(
+        np.concatenate([far.amplitude for far in fars], axis=2) / np.sqrt(len(fars)),
+        np.mean([far.power for far in fars], axis=0),
+        np.sum([far.rays for far in fars], axis=0),
+        {name: float(np.mean([far.shares[name] for far in fars])) for name in FATES},
+        fars[0].incident,
+    )
+
+
+def far_field(
+    setup: Setup,
+    theta: float,
+    phi: float,
+    detector: Detector,
+    wavelengths: npt.ArrayLike,
+    *,
+    method: str = "rays",
+    jones: npt.ArrayLike | None = None,
+    chosen: npt.NDArray[np.bool_] | None = None,
+    max_bounces: int = 100,
+    min_amplitude: float = 1e-6,
+    max_reflections: int | None = None,
+    half_wave_loss: bool = True,
+    tolerance: float = TOLERANCE,
+    threads: int | None = None,
+) -> Far:
+    """Trace one incidence, and sum what arrives at a detector.
+
+    Parameters
+    ----------
+    setup : Setup
+    theta, phi : float, radians
+        Where the light comes from.
+    detector : Cones, Cells or Pixels
+    wavelengths : (w,) float64, metres
+    method, max_bounces, min_amplitude, max_reflections, half_wave_loss, tolerance, threads
+        See `brdf`.
+    jones : (2,) complex, optional
+        Amplitudes of s and p of the light, see `Setup.light`.
+    chosen : (theta, phi) bool, optional
+        The directions whose amplitudes are wanted; the others stay 0. Default: all.
+
+    Returns
+    -------
+    Far
+    """
+    waves, size = checked_wavelengths(wavelengths), (len(detector.theta), len(detector.phi))
+    wanted = np.ones(size, dtype=bool) if chosen is None else chosen
+    source = setup.light(theta, phi, jones)
+    total = np.zeros((*size, parts(source), len(waves)), dtype=np.complex128)
+    power, count = np.zeros((*size, len(waves))), np.zeros(size, dtype=np.int64)
+    shares, incident = np.zeros(len(FATES)), 0.0
+    bands = _bands(setup.scene, waves)
+    adding = _Adding(setup, detector, method, wanted & (method != "power"), half_wave_loss, tolerance)
+    for wavelength, band in bands:
+        start = setup.start(source, wavelength)
+        for paths in stream(
+            setup.scene, source, wavelength=wavelength, max_bounces=max_bounces, min_amplitude=min_amplitude,
+            threads=threads, chunk=CHUNK,
+        ):  # fmt: skip
+            shares, incident = shares + _shares(paths), incident + paths.ledger().incident
+            most = paths if max_reflections is None else paths.where(paths.reflections <= max_reflections)
+            sums, powers, counts = adding.chunk(most, start, waves[band])
+            total[..., band] += sums
+            power[..., band] += powers[..., None]
+            count += counts
+    fates = dict(zip(FATES, (shares / incident).tolist(), strict=True))
+    return Far(total, power, count, fates, incident / len(bands))

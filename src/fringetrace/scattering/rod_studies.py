@@ -1,0 +1,299 @@
+"""Lattices of rods, ordered and disordered, and how their BRDF changes with their parameters."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import FloatArray, array, checked_wavelengths, degree, grid, sweep
+from fringetrace.rigorous import Polarisation, differential_width, scatter, spectrum
+from fringetrace.scattering.detectors import Cones, checked_angles
+from fringetrace.scattering.far_fields import FATES
+from fringetrace.scattering.goniometer import AXES, METHODS, brdf
+from fringetrace.scattering.rod_lattice import MEDIA, Lattice as Lattice
+
+if TYPE_CHECKING:
+    from xarray import DataArray
+
+    from fringetrace.optics import Material
+
+
+Polarised = Polarisation | Literal["unpolarised"]
+# Surfaces that light may meet, and the least amplitude of a branch.
+BOUNCES, FAINT = 100, 1e-3
+# Materials by name and by index at the wavelengths: names alone do not tell them apart.
+Media = Mapping[tuple[str | None, bytes], "Material"]
+# The field along the rods, as the goniometer says it; s light has the amplitudes of one number a ray.
+ALONG = {"E": None, "H": "p", "unpolarised": "unpolarised"}
+
+
+def _cell(
+    theta_i: npt.ArrayLike, theta_o: npt.ArrayLike, half_angle: float, wavelengths: npt.ArrayLike,
+    method: str, polarisation: Polarised, rays: int, max_bounces: int, min_amplitude: float,
+    indices: npt.NDArray[np.complex128], media: Media, **parameters: Any,
+) -> dict[str, FloatArray]:  # fmt: skip
+    """One lattice: its BRDF in the plane across the rods, and where the power went."""
+    found = {name: media.get(_known(parameters[name], at)) for name, at in zip(MEDIA, indices, strict=True)}
+    lattice = Lattice(**parameters | found)
+    if method == "rods":
+        values = cluster(lattice, theta_i, theta_o, wavelengths, polarisation)
+        unknown = np.full((len(values), 1), np.nan)
+        return {"brdf": values[:, None, :, None], **dict.fromkeys(FATES, unknown)}
+    table = brdf(
+        lattice.scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths, method=method,
+        polarisation=ALONG[polarisation], rays=(1, rays), max_bounces=max_bounces,
+        min_amplitude=min_amplitude, threads=1, **lattice.lighting,
+    )  # fmt: skip
+    return {"brdf": table.values, **{name: table[name].values for name in FATES}}
+
+
+def cluster(
+    lattice: Lattice,
+    theta_i: npt.ArrayLike,
+    theta_o: npt.ArrayLike,
+    wavelengths: npt.ArrayLike,
+    polarisation: Polarised = "E",
+) -> FloatArray:
+    """BRDF of a lattice in the plane across its rods, by rigorous multiple scattering.
+
+    f = (length / wavelength) (d sigma / d theta) / (width cos theta_i cos theta_o): rods of a length of
+    many waves send d sigma / d theta into a lobe that is wavelength / length wide along them, and its
+    middle is what ray sums give in the same plane. A host's front face lets light in and out (Snell,
+    Fresnel); what it throws back, of the incident light or from below, is left out.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Rods may not overlap.
+    theta_i, theta_o : (n,) radians
+        Position angles, outside of the host.
+    wavelengths : (w,) float64, metres
+    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
+        The field along the rods; the mean of both.
+
+    Returns
+    -------
+    (theta_i, theta_o, wavelength) float64, 1/sr
+
+    Raises
+    ------
+    ValueError
+        As `cylinders.Cylinders` and `cylinders.scatter`; for mirrors that absorb.
+    """
+    if polarisation == "unpolarised":
+        e, h = (cluster(lattice, theta_i, theta_o, wavelengths, each) for each in get_args(Polarisation))
+        return 0.5 * (e + h)
+    start, end = checked_angles(theta_i, "cluster theta_i"), checked_angles(theta_o, "cluster theta_o")
+    rods, (width, _) = lattice.cylinders, lattice.footprint
+    values = []
+    for wave in checked_wavelengths(wavelengths):
+        host = 1.0 if lattice.host is None else float(lattice.host.index(wave).real)
+        (inward, into), (outward, out) = (_through(host, angle, polarisation) for angle in (start, end))
+        scattered = scatter(rods, float(wave), -np.pi / 2 - inward, polarisation)
+        sent = differential_width(scattered, np.pi / 2 - outward)
+        # a width is over the irradiance inside; an angle outside is wider than that inside
+        wider = np.cos(end) / (host * np.cos(outward))
+        entered = into * np.cos(start) / np.cos(inward)
+        whole = lattice.length / wave * entered[:, None] * sent * out * wider
+        values.append(whole / (width * np.cos(start)[:, None] * np.cos(end)))
+    return np.stack(values, axis=-1)
+
+
+def _through(host: float, angle: FloatArray, polarisation: Polarisation) -> tuple[FloatArray, FloatArray]:
+    """Angles inside of a host, and the parts of the power that pass its face."""
+    inside = np.arcsin(np.sin(angle) / host)
+    here, there = np.cos(angle), host * np.cos(inside)
+    if polarisation == "H":
+        here, there = here * host, there / host
+    return inside, 4.0 * here * there / (here + there) ** 2
+
+
+def specular(
+    lattice: Lattice,
+    theta_i: npt.ArrayLike,
+    wavelengths: npt.ArrayLike,
+    *,
+    method: str = "rods",
+    polarisation: Polarised = "unpolarised",
+) -> DataArray:
+    """What a lattice of rows that never end reflects, rigorously or as a multilayer.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        Without disorder; its columns do not matter.
+    theta_i : (n,) radians
+        From where, outside of the host.
+    wavelengths : (w,) float64, metres
+    method, polarisation
+        See `lattices.spectrum`.
+
+    Returns
+    -------
+    xarray.DataArray, float64, 1
+        Axes theta_i, wavelength: reflected over incident power, all diffraction orders together; with
+        the transmitted part, and what rays would be worth.
+
+    Raises
+    ------
+    ValueError
+        As `Lattice.endless` and `lattices.spectrum`.
+    """
+    start, waves = checked_angles(theta_i, "specular theta_i"), checked_wavelengths(wavelengths)
+    found = spectrum(lattice.endless, waves, start[:, None], polarisation, method)
+    axes = ("theta_i", "wavelength")
+    coordinates = {
+        "theta_i": ("theta_i", start, {"units": "rad"}),
+        "wavelength": ("wavelength", waves, {"units": "m"}),
+        "transmitted": (axes, found.transmittance, {"units": "1"}),
+    }
+    attributes: dict[str, Any] = {
+        "units": "1",
+        "long_name": "reflectance",
+        "method": method,
+        "polarisation": polarisation,
+    }
+    attributes |= believed([lattice], waves)
+    return array(found.reflectance, axes, coordinates, "reflectance", attributes)
+
+
+def believed(kinds: Sequence[Lattice], waves: FloatArray) -> dict[str, float | str]:
+    """What rays are worth on the smallest of some rods, at the longest of some wavelengths: attributes."""
+    return min((kind.validity(waves.max()) for kind in kinds), key=lambda v: v.size_parameter).attributes
+
+
+def _spoken(lattice: Lattice) -> dict[str, Any]:
+    """Parameters of a lattice, materials by name."""
+    return vars(lattice) | {
+        name: medium.name for name in MEDIA if (medium := getattr(lattice, name)) is not None
+    }
+
+
+def _known(name: str | None, indices: npt.NDArray[np.complex128]) -> tuple[str | None, bytes]:
+    """A material in `Media`."""
+    return name, np.asarray(indices, np.complex128).tobytes()
+
+
+def _indices(lattice: Lattice, waves: FloatArray) -> npt.NDArray[np.complex128]:
+    """Of rod and host at each wavelength, 0 for none."""
+    media = [getattr(lattice, name) for name in MEDIA]
+    return np.array([np.zeros(len(waves)) if medium is None else medium.index(waves) for medium in media])
+
+
+def study(
+    lattice: Lattice,
+    axes: Mapping[str, Sequence[Any]],
+    theta_i: npt.ArrayLike,
+    theta_o: npt.ArrayLike,
+    wavelengths: npt.ArrayLike,
+    *,
+    half_angle: float = 1.0 * degree,
+    method: str = "rays",
+    polarisation: Polarised = "E",
+    rays: int = 2000,
+    max_bounces: int = BOUNCES,
+    min_amplitude: float = FAINT,
+    folder: str | os.PathLike[str] | None = None,
+    **sweeping: Any,
+) -> DataArray:
+    """BRDF of many lattices in the plane across their rods.
+
+    Parameters
+    ----------
+    lattice : Lattice
+        What stays the same.
+    axes : dict of sequences
+        Values of each parameter that changes, by the names of `Lattice`; every combination is traced.
+    theta_i, theta_o : (n,) radians
+        From where and to where, see `goniometer.brdf`.
+    wavelengths : (w,) float64, metres
+    half_angle : float, radians
+        Acceptance, see `goniometer.Cones`.
+    method, max_bounces
+        See `goniometer.brdf`; or "rods": the rigorous answer in the same unit, see `cluster`. It has no
+        use for half angle, rays and bounces, and does not say where the power went (NaN). For endless
+        rows, and as a multilayer, see `specular`.
+    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
+        The field along the rods; the mean of both takes twice the time.
+    rays : int
+        Across the lattice.
+    min_amplitude : float
+        Branches below this part of the launched amplitude are cut off, see `trace`: matter splits rays
+        at each boundary.
+    folder, sweeping
+        See `sweeps.sweep`: kept results, executor, scheduler, processes, progress.
+
+    Returns
+    -------
+    xarray.DataArray, float64, 1/sr
+        Axes: the parameters, then those of `goniometer.brdf`; with the parts of the power by what
+        became of it.
+
+    Raises
+    ------
+    ValueError
+        For a parameter that a lattice does not have, and as `Lattice` and `goniometer.brdf`.
+    """
+    known = [field.name for field in fields(Lattice)]
+    for name in axes:
+        if name not in known:
+            raise ValueError(f"lattice study: expected parameters among {', '.join(known)}, got {name!r}")
+    if method not in (*METHODS, "rods"):
+        raise ValueError(f"lattice study method: expected {', '.join(METHODS)} or rods, got {method!r}")
+    if polarisation not in ALONG:
+        raise ValueError(f"lattice study polarisation: expected {', '.join(ALONG)}, got {polarisation!r}")
+    incidence, waves = checked_angles(theta_i, "lattice study theta_i"), checked_wavelengths(wavelengths)
+    observation = checked_angles(theta_o, "lattice study theta_o")
+    fixed = {
+        "theta_i": incidence, "theta_o": observation, "half_angle": half_angle, "wavelengths": waves,
+        "method": method, "polarisation": polarisation, "rays": rays, "max_bounces": max_bounces,
+        "min_amplitude": min_amplitude,
+    }  # fmt: skip
+    kinds = [replace(lattice, **values) for values in grid(**axes)]
+    indices = [_indices(kind, waves) for kind in kinds]
+    media = {
+        _known(medium.name, at): medium
+        for kind, each in zip(kinds, indices, strict=True)
+        for medium, at in zip((kind.rod, kind.host), each, strict=True)
+        if medium is not None
+    }
+    cells = [_spoken(kind) | fixed | {"indices": each} for kind, each in zip(kinds, indices, strict=True)]
+    done = sweep(partial(_cell, media=media), cells, folder, **sweeping)
+    attributes = {"method": method, "polarisation": polarisation, "half_angle_rad": half_angle}
+    attributes |= believed(kinds, waves) | {
+        f"lattice_{name}": int(value) if isinstance(value, bool) else value
+        for name, value in _spoken(lattice).items()
+        if name not in axes and value is not None
+    }
+    return _table(done, axes, (incidence, observation, waves), attributes)
+
+
+def _table(
+    done: Sequence[Mapping[str, FloatArray]], axes: Mapping[str, Sequence[Any]],
+    along: tuple[FloatArray, FloatArray, FloatArray], attributes: Mapping[str, Any],
+) -> DataArray:  # fmt: skip
+    """The cells of a study, `along` theta_i, theta_o and wavelength, with the power beside the BRDF."""
+    incidence, observation, waves = along
+    shape = tuple(len(values) for values in axes.values())
+    coordinates: dict[str, Any] = {
+        name: (name, [getattr(v, "name", str(v)) for v in values] if name in MEDIA else list(values))
+        for name, values in axes.items()
+    } | {
+        "theta_i": ("theta_i", incidence, {"units": "rad"}),
+        "phi_i": ("phi_i", np.zeros(1), {"units": "rad"}),
+        "theta_o": ("theta_o", observation, {"units": "rad"}),
+        "phi_o": ("phi_o", np.zeros(1), {"units": "rad"}),
+        "wavelength": ("wavelength", waves, {"units": "m"}),
+    }
+    for name in FATES:
+        share = np.stack([one[name] for one in done])
+        coordinates[name] = ((*axes, *AXES[:2]), share.reshape(*shape, *share.shape[1:]), {"units": "1"})
+    values = np.stack([one["brdf"] for one in done])
+    unit = {"units": "1/sr", "long_name": "BRDF", **attributes}
+    return array(values.reshape(*shape, *values.shape[1:]), (*axes, *AXES), coordinates, "brdf", unit)

@@ -1,0 +1,6 @@
+from .facet_groups import parted as parted
+from .model import Scene as Scene, Surface as Surface
+from .sensor import CCD as CCD, pixel_centres as pixel_centres, pixels as pixels, screen as screen
+from .sensor_kernels import lands as lands, place as place
+from .sources import Beam as Beam, Gaussian as Gaussian, Profile as Profile, as_names as as_names
+from .spectrum import Line as Line, Spectrum as Spectrum

@@ -1,0 +1,185 @@
+"""The nouns of a scene, checked once, at the door: Surface, Beam, CCD, Scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy.typing as npt
+
+from fringetrace.geometry import Mesh, as_mesh
+from fringetrace.optics import Dielectric, Interface, Metal
+
+if TYPE_CHECKING:
+    from fringetrace.geometry import Form
+    from fringetrace.optics import Element, Material
+
+
+def _medium(value: Any, what: str) -> Material | None:
+    if value is None:
+        return None
+    from fringetrace.optics import as_material
+
+    return as_material(value, what)
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """A mesh and what it does to light.
+
+    Parameters
+    ----------
+    mesh : Mesh, trimesh.Trimesh, pyvista.PolyData, or alike, metres
+    interface : Interface, Dielectric, Metal, or one of `fringetrace.optics.elements`
+        `Mirror`, `Absorber`, `BeamSplitter`; `Dielectric`, `Metal`; thin optical elements.
+    name : str
+    form : Form, optional
+        The exact surface that the facets stand for, one of `fringetrace.geometry.forms`; None: the facets
+        are the surface.
+    front, back : Material, or number, or name of a material, optional
+        The media of a `Dielectric` or `Metal`, on the side that the mesh's normals point to and on the
+        other; None: that of the scene.
+
+    Raises
+    ------
+    TypeError
+        If `mesh` is no mesh, `interface` no interface, `form` no form, a medium no material.
+    ValueError
+        If the mesh does not lie along the form, or media are missing or not asked for.
+    """
+
+    mesh: Mesh
+    interface: Interface | Dielectric | Metal | Element
+    name: str = "surface"
+    form: Form | None = None
+    front: Material | None = None
+    back: Material | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mesh", as_mesh(self.mesh, self.name))
+        constant = all(hasattr(self.interface, name) for name in ("reflection", "transmission"))
+        known = constant or isinstance(self.interface, (Dielectric, Metal)) or hasattr(self.interface, "act")
+        if isinstance(self.interface, type) or not known:
+            raise TypeError(f"{self.name} interface: expected one such as Mirror(), got {self.interface!r}")
+        self._check_media()
+        if self.form is not None:
+            if isinstance(self.form, type) or not hasattr(self.form, "fit"):
+                raise TypeError(f"{self.name} form: expected one such as forms.Sphere, got {self.form!r}")
+            self.form.fit(self.mesh.vertices, self.mesh.faces)  # refuses what is not meant for this mesh
+
+    @property
+    def boundary(self) -> bool:
+        """Whether it parts two media."""
+        return isinstance(self.interface, (Dielectric, Metal))
+
+    def _check_media(self) -> None:
+        for side in ("front", "back"):
+            object.__setattr__(self, side, _medium(getattr(self, side), f"{self.name} {side}"))
+        given = [side for side in ("front", "back") if getattr(self, side) is not None]
+        kind = type(self.interface).__name__
+        if given and not self.boundary:
+            raise ValueError(f"{self.name} {given[0]}: expected no medium beside a {kind}, got one")
+        if self.boundary and not given:
+            raise ValueError(f"{self.name}: expected a medium in front of a {kind} or behind it, got none")
+
+    def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Surface:
+        """The surface, mesh, interface and form, turned about the origin, then shifted; as `Mesh.moved`.
+
+        Parameters
+        ----------
+        offset : (3,) array-like, metres
+        turn : (3, 3) array-like, optional
+
+        Returns
+        -------
+        Surface
+        """
+        form = None if self.form is None else self.form.moved(offset, turn)
+        interface = self.interface
+        if hasattr(interface, "moved"):
+            interface = interface.moved(offset, turn)
+        return replace(self, mesh=self.mesh.moved(offset, turn), interface=interface, form=form)
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Surfaces that light meets.
+
+    Parameters
+    ----------
+    surfaces : iterable of Surface
+    medium : Material, or number, or name of a material, optional
+        What is around them, where beams start; None: a vacuum.
+
+    Raises
+    ------
+    TypeError
+        If one of them is not a Surface, or the medium no material.
+    ValueError
+        If there are none.
+    """
+
+    surfaces: tuple[Surface, ...]
+    medium: Material | None = None
+    # what rooms above have derived from the surfaces (the engine's bodies), kept with them
+    derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        surfaces = tuple(self.surfaces) if isinstance(self.surfaces, Iterable) else (self.surfaces,)
+        for surface in surfaces:
+            if not isinstance(surface, Surface):
+                raise TypeError(f"Scene: expected Surface, got {type(surface).__name__}")
+        if not surfaces:
+            raise ValueError("Scene: expected at least one Surface, got none")
+        object.__setattr__(self, "surfaces", surfaces)
+        object.__setattr__(self, "medium", _medium(self.medium, "Scene medium"))
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "derived": {}}
+
+    @property
+    def around(self) -> Material:
+        """The medium around the surfaces."""
+        if self.medium is not None:
+            return self.medium
+        from fringetrace.optics import VACUUM
+
+        return VACUUM
+
+    @property
+    def digits(self) -> tuple[tuple[int, bool], ...]:
+        """Surface and branch (whether transmitted) for which each digit of a path key stands, from 1 on.
+
+        Two for each surface; then one for each further branch of elements with several.
+        """
+        plain = [(number, through) for number in range(len(self.surfaces)) for through in (False, True)]
+        further = [
+            (number, True)
+            for number, surface in enumerate(self.surfaces)
+            for _ in range(getattr(surface.interface, "branches", 1) - 1)
+        ]
+        return (*plain, *further)
+
+    def index(self, name: str) -> int:
+        """Position of the surface called `name`.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ValueError
+            If no surface, or more than one, is called so.
+        """
+        names = [surface.name for surface in self.surfaces]
+        if names.count(name) != 1:
+            raise ValueError(
+                f"Scene: expected one surface called {name!r}, got {names.count(name)} in {names}"
+            )
+        return names.index(name)

@@ -1,0 +1,125 @@
+"""The pixel CCD: its plane, pixel coordinates and pixel centres."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from numbers import Real
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fringetrace.core import (
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    frame,
+)
+from fringetrace.scene.planes import Axes, checked_grid, checked_positive
+
+if TYPE_CHECKING:
+    pass
+
+
+def pixels(ccd: CCD, point: FloatArray) -> FloatArray:
+    """CCD coordinates of points in its plane of focus.
+
+    Parameters
+    ----------
+    ccd : CCD
+    point : (n, 3) float64, metres
+
+    Returns
+    -------
+    (n, 2) float64
+        (row, column) in pixels; pixel [i, j] spans [i, i+1) x [j, j+1).
+    """
+    from fringetrace.scene.sensor_kernels import locate
+
+    pixel = np.empty((len(point), 2))
+    locate(screen(ccd), ccd.pitch, *ccd.shape, np.ascontiguousarray(point), pixel)
+    return pixel
+
+
+def screen(ccd: CCD) -> tuple[float, ...]:
+    """A CCD as the kernels read it: centre, normal, u, v, half width, half height, focus.
+
+    Parameters
+    ----------
+    ccd : CCD
+
+    Returns
+    -------
+    15 floats, metres
+    """
+    u, v, n = ccd.axes
+    width, height = ccd.size
+    numbers = [*ccd.centre, *n, *u, *v, 0.5 * width, 0.5 * height, ccd.focus]
+    return tuple(float(number) for number in numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class CCD:
+    """A rectangle of pixels that records what falls on its front.
+
+    Images are arrays [row, column] = [v, u], origin lower: u = normal x up is to the right of
+    somebody who looks out of the chip along its normal, v is up. Light from behind passes.
+
+    Parameters
+    ----------
+    centre : (3,) metres
+    normal : (3,)
+        Points to where the light comes from.
+    up : (3,)
+        Direction of increasing row.
+    pitch : float, metres
+        Side of the square pixels.
+    shape : (rows, columns)
+    focus : float, metres
+        Distance in front of the chip of the plane that an ideal 1:1 relay images onto it;
+        field positions and optical paths are those in that plane. 0: the bare chip.
+
+    Raises
+    ------
+    ValueError
+        For a normal of length 0, an `up` along it, a pitch or shape that is not positive.
+    """
+
+    centre: FloatArray
+    normal: FloatArray
+    up: FloatArray
+    pitch: float
+    shape: tuple[int, int]
+    focus: float = 0.0
+    axes: Axes = field(init=False, repr=False)  # of columns, rows, and the normal
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", checked_vector(self.centre, "CCD centre"))
+        object.__setattr__(self, "normal", checked_direction(self.normal, "CCD normal"))
+        object.__setattr__(self, "up", checked_direction(self.up, "CCD up"))
+        object.__setattr__(self, "axes", frame(self.normal, self.up, "CCD"))
+        object.__setattr__(self, "pitch", checked_positive(self.pitch, "CCD pitch"))
+        object.__setattr__(self, "shape", checked_grid(self.shape, "CCD shape"))
+        if not (isinstance(self.focus, Real) and np.isfinite(self.focus)):
+            raise ValueError(f"CCD focus: expected a length in metres, got {self.focus!r}")
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height, metres."""
+        return self.shape[1] * self.pitch, self.shape[0] * self.pitch
+
+
+def pixel_centres(shape: tuple[int, int], pitch: float) -> tuple[FloatArray, FloatArray]:
+    """Positions of pixels about the centre of their image.
+
+    Parameters
+    ----------
+    shape : (rows, columns)
+    pitch : float, metres
+
+    Returns
+    -------
+    x : (columns,) float64, metres
+    y : (rows,) float64, metres
+    """
+    y, x = ((np.arange(n, dtype=np.float64) + 0.5 - 0.5 * n) * pitch for n in shape)
+    return np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)

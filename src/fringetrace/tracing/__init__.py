@@ -1,0 +1,5 @@
+"""Rays traced through a scene to paths, with optical path length and power ledger."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

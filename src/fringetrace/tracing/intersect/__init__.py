@@ -1,0 +1,1 @@
+"""Ray-triangle intersection: Embree finds the facet, float64 measures it."""

@@ -1,0 +1,234 @@
+"""Finds the hit: Embree says which triangle, float64 says where; the nearest over all bodies wins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import Array, FloatArray
+from fringetrace.scene import Scene
+from fringetrace.tracing.batch import Batch, Ends
+from fringetrace.tracing.intersect.bodies import Body, IntArray, group, unite
+
+
+@dataclass(frozen=True, eq=False)
+class Engine:
+    """Bodies of a scene, and whose each triangle is.
+
+    `owner` (t,) is the surface of a triangle, `offset` (surfaces,) the number of its first one.
+    """
+
+    bodies: tuple[Body, ...]
+    owner: npt.NDArray[np.int32]
+    offset: IntArray
+
+    @property
+    def base(self) -> int:
+        """Base of a path key, whose digits name surface and branch."""
+        return 2 * len(self.offset) + 1
+
+    @cached_property
+    def digit(self) -> Array:
+        """(t,) What a reflection off each triangle adds to a path key; small, to stay in the cache."""
+        return (2 * self.owner + 1).astype(np.min_scalar_type(self.base))
+
+
+@dataclass(frozen=True, eq=False)
+class Hits:
+    """What each row of a batch met last, and what Embree is asked (float32).
+
+    `met` has the columns that `kernels` names: path (metres), point, normal, distance from the edge;
+    `triangle` is -1 where nothing was met.
+    """
+
+    met: FloatArray
+    triangle: IntArray
+    origin32: npt.NDArray[np.float32]
+    direction32: npt.NDArray[np.float32]
+    sent: IntArray
+    asked: IntArray
+
+    @staticmethod
+    def blank(rows: int) -> Hits:
+        """Room for so many rows."""
+        return Hits(
+            met=np.empty((rows, 8)),
+            triangle=np.empty(rows, dtype=np.int64),
+            origin32=np.empty((rows, 3), dtype=np.float32),
+            direction32=np.empty((rows, 3), dtype=np.float32),
+            sent=np.empty(rows, dtype=np.int64),
+            asked=np.empty(rows, dtype=np.int64),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Limits:
+    """Where paths end: on a screen (as `screens` reads it), after so many bounces; the first ray's number."""
+
+    screen: tuple[float, ...]
+    has_screen: bool
+    max_bounces: int
+    first: int
+
+    @property
+    def packed(self) -> tuple[tuple[float, ...], bool, int]:
+        """The limits as the kernels take them."""
+        return self.screen, self.has_screen, self.max_bounces
+
+
+def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
+    """The engine of a scene; built once and kept with the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    alone : set of surface numbers
+        Those that need a body of their own, because some rays pass over them.
+
+    Returns
+    -------
+    Engine
+    """
+    name = f"engine {sorted(alone)}"
+    if name not in scene.derived:
+        bodies: list[Body] = []
+        offset = np.zeros(len(scene.surfaces), dtype=np.int64)
+        owner: list[Array] = []
+        first = 0
+        meshes = [surface.mesh for surface in scene.surfaces]
+        for members in group(meshes, alone):
+            body = unite(meshes, members, first)
+            for i in members:
+                offset[i] = first
+                first += len(meshes[i].faces)
+                owner.append(np.full(len(meshes[i].faces), i, dtype=np.int32))
+            bodies.append(body)
+        scene.derived[name] = Engine(tuple(bodies), np.concatenate(owner), offset)
+    engine: Engine = scene.derived[name]
+    return engine
+
+
+def aim(
+    engine: Engine, batch: Batch, rows: int, hits: Hits, number: int, fresh: bool, cull: bool = True
+) -> int:
+    """Float32 rays towards a body, into `hits`; returns how many of the batch can meet it."""
+    from fringetrace.tracing.intersect import kernels
+
+    body = engine.bodies[number]
+    count: int = kernels.aim(
+        rows, batch.state, batch.last, body.frame, body.first, body.stop, engine.owner,
+        np.array(body.surfaces), body.flat, *body.boxes, cull, hits.met, hits.triangle,
+        fresh, hits.origin32, hits.direction32, hits.sent,
+    )  # fmt: skip
+    return count
+
+
+def _second(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.int32], hits: Hits) -> None:
+    """Other opinions, a little aside, on suspicious answers; -2 where one of them differs.
+
+    Three of rays that come from elsewhere, one of rays that have just left this body.
+    """
+    from fringetrace.tracing.intersect import kernels
+
+    for leaving, turns in ((False, 3), (True, 0 if body.closed else 1)):
+        if turns == 0:
+            continue
+        found = kernels.suspect(
+            hits.sent, count, prim, batch.state, batch.last, body.packed, hits.origin32, leaving, hits.asked,
+        )  # fmt: skip
+        rows = hits.asked[:found]
+        moved, heading = np.empty((2, found, 3), dtype=np.float32)
+        first = prim[rows]
+        for turn in range(turns if found else 0):
+            kernels.beside(
+                hits.sent, hits.asked, found, batch.state, batch.last, body.packed, hits.origin32, turn,
+                moved, heading,
+            )  # fmt: skip
+            prim[rows[body.embree.run(moved, heading) != first]] = -2
+
+
+def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:
+    """Nearest hit of each ray, written into `hits`.
+
+    Parameters
+    ----------
+    engine : Engine
+    batch : Batch
+    rows : int
+        How many rays it holds.
+    hits : Hits
+        At least as many rows.
+    passed : set of surface numbers
+        Surfaces to be passed over; each must have a body of its own.
+
+    Returns
+    -------
+    int
+        How many rays were decided exactly.
+    """
+    from fringetrace.tracing.intersect import kernels
+
+    origin32, direction32 = hits.origin32, hits.direction32
+    doubtful = 0
+    fresh = True
+    for number, body in enumerate(engine.bodies):
+        if passed.issuperset(body.surfaces):
+            continue
+        count = aim(engine, batch, rows, hits, number, fresh)
+        fresh = False
+        if count == 0:
+            continue
+        body.prepare()
+        prim = body.embree.run(origin32[:count], direction32[:count])
+        _second(body, batch, count, prim, hits)
+        doubtful += kernels.measure(
+            hits.sent, count, prim, batch.state, batch.last, batch.came, body.packed, hits.met, hits.triangle,
+        )  # fmt: skip
+    if fresh:
+        hits.met[:rows, 0] = np.inf
+        hits.triangle[:rows] = -1
+    return doubtful
+
+
+def follow(
+    engine: Engine, batch: Batch, rows: int, bounces: int, hits: Hits, ends: Ends, limits: Limits
+) -> tuple[int, int, int]:
+    """One more bounce of rays that have all just left the only body, all of ideal mirrors.
+
+    Does what `find` and `bounces.interact` do, without amplitudes and in one pass over the rays.
+
+    Parameters
+    ----------
+    engine : Engine
+        Of one body.
+    batch : Batch
+    rows : int
+        How many rays it holds.
+    bounces : int
+        How often each has been reflected.
+    hits : Hits
+        Its float32 rays are those of the batch; they are brought up to date.
+    ends : Ends
+    limits : Limits
+
+    Returns
+    -------
+    rows, ended, doubtful : int
+        How many rays go on, have ended now, were decided exactly.
+    """
+    from fringetrace.tracing.kernels_mirrors import rebound
+
+    body = engine.bodies[0]
+    prim = body.embree.run(hits.origin32[:rows], hits.direction32[:rows])
+    if not body.closed and prim.min() < 0:
+        _second(body, batch, rows, prim, hits)
+    result: tuple[int, int, int] = rebound(
+        rows, bounces, prim, (batch.key, batch.ray, batch.state, batch.last, batch.came), body.packed,
+        engine.digit, np.uint64(engine.base), limits.packed,
+        (ends.key, ends.ray, ends.bounces, ends.origin, ends.direction, ends.length, ends.fate),
+        limits.first, hits.origin32, hits.direction32,
+    )  # fmt: skip
+    return result

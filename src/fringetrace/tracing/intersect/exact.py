@@ -1,0 +1,214 @@
+"""First hits in float64 alone: a bounding volume tree, and a watertight test, compiled by numba.
+
+What float32 leaves in doubt is decided here. `planes` has 16 numbers a triangle: its plane
+n.p + c = 0 with n unit, then three edge planes whose value is the distance inside each edge.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fringetrace.core import jit, part
+
+# Triangles in a leaf of the tree.
+LEAF = 4
+
+
+@jit
+def select(order, keys, start, stop, middle):
+    """Reorder order[start:stop] so that the keys before `middle` are none larger than those after."""
+    low, high = start, stop - 1
+    while low < high:
+        pivot = keys[order[(low + high) // 2]]
+        i, j = low, high
+        while i <= j:
+            while keys[order[i]] < pivot:
+                i += 1
+            while keys[order[j]] > pivot:
+                j -= 1
+            if i <= j:
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            break
+
+
+@jit
+def arrange(middle, leaves):
+    """Order of triangles for a complete binary tree: halved across the longest extent of their centres.
+
+    `middle` is (3, t).
+    """
+    count = middle.shape[1]
+    order = np.arange(count)
+    stack = [(0, LEAF * leaves)]
+    while len(stack) > 0:
+        start, size = stack.pop()
+        half = size // 2
+        stop = min(start + size, count)
+        if size <= LEAF or stop <= start:
+            continue
+        # the halves of a node are full from the left: what is missing is missing at the end
+        if stop - start > half:
+            widest, axis = -1.0, 0
+            for k in range(3):
+                low, high = np.inf, -np.inf
+                for i in range(start, stop):
+                    value = middle[k, order[i]]
+                    low, high = min(low, value), max(high, value)
+                if high - low > widest:
+                    widest, axis = high - low, k
+            select(order, middle[axis], start, stop, start + half)
+            stack.append((start + half, half))
+        stack.append((start, half))
+    return order
+
+
+@part
+def permute(x, y, z, axis):
+    """Coordinates with `axis` last (cyclic)."""
+    if axis == 0:
+        return y, z, x
+    if axis == 1:
+        return z, x, y
+    return x, y, z
+
+
+@jit
+def crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
+    """Whether a line goes through a triangle: watertight, shared edges decide alike on both sides.
+
+    Source: Woop, Benthin, Wald, J. Comput. Graph. Tech. 2 (2013) 65, in float64.
+    """
+    ax, ay, az = permute(corners[tri, 0] - x, corners[tri, 1] - y, corners[tri, 2] - z, axis)
+    bx, by, bz = permute(corners[tri, 3] - x, corners[tri, 4] - y, corners[tri, 5] - z, axis)
+    cx, cy, cz = permute(corners[tri, 6] - x, corners[tri, 7] - y, corners[tri, 8] - z, axis)
+    ax, ay = ax - shear_x * az, ay - shear_y * az
+    bx, by = bx - shear_x * bz, by - shear_y * bz
+    cx, cy = cx - shear_x * cz, cy - shear_y * cz
+    u = cx * by - cy * bx
+    v = ax * cy - ay * cx
+    w = bx * ay - by * ax
+    if (u < 0.0 or v < 0.0 or w < 0.0) and (u > 0.0 or v > 0.0 or w > 0.0):
+        return False
+    return u + v + w != 0.0
+
+
+@part
+def inset(planes, tri, x, y, z):
+    """Distance inside the nearest edge of a triangle; negative outside."""
+    a = planes[tri, 4] * x + planes[tri, 5] * y + planes[tri, 6] * z + planes[tri, 7]
+    b = planes[tri, 8] * x + planes[tri, 9] * y + planes[tri, 10] * z + planes[tri, 11]
+    c = planes[tri, 12] * x + planes[tri, 13] * y + planes[tri, 14] * z + planes[tri, 15]
+    least = a if a < b else b
+    return least if least < c else c
+
+
+@part
+def enters(lower, upper, node, x, y, z, ix, iy, iz, nearest):
+    """Path at which a ray enters a box, or infinity if it does not before `nearest`."""
+    if lower[node, 0] > upper[node, 0]:  # an empty one
+        return np.inf
+    ax, bx = (lower[node, 0] - x) * ix, (upper[node, 0] - x) * ix
+    ay, by = (lower[node, 1] - y) * iy, (upper[node, 1] - y) * iy
+    az, bz = (lower[node, 2] - z) * iz, (upper[node, 2] - z) * iz
+    begin, end = min(ax, bx), max(ax, bx)
+    begin, end = max(begin, min(ay, by)), min(end, max(ay, by))
+    begin, end = max(begin, min(az, bz)), min(end, max(az, bz))
+    return begin if begin <= end and end >= -1e-9 and begin <= nearest else np.inf
+
+
+@part
+def inverse(component):
+    """1 / component, finite: a slab that a ray runs along is entered nowhere or everywhere."""
+    return 1.0 / component if abs(component) > 1e-200 else 1e200
+
+
+@jit
+def decide(
+    x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper, tolerance
+):  # fmt: skip
+    """First hit of a ray in float64 alone, by a bounding volume tree; triangle -1 if none before `limit`.
+
+    `skip` is the triangle just left, `guess` one that is likely hit (or below 0). A face that
+    the start touches is hit at 0 if the ray goes on through it: seen from the region it travels
+    in (`side` = +-1: before or behind oriented faces), or, for side = 0, in the sense in which
+    it came, along b. side = 2: a source, which touches nothing.
+    """
+    magnitude = max(abs(dx), abs(dy), abs(dz))
+    axis = 0 if abs(dx) == magnitude else (1 if abs(dy) == magnitude else 2)
+    px, py, pz = permute(dx, dy, dz, axis)
+    shear_x, shear_y = px / pz, py / pz
+    ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
+    nearest, best = limit, -1
+    leaves = len(lower) // 2
+    stack = np.empty(64, np.int64)
+    stack[0] = 1
+    depth = 1
+    first = guess >= 0 and guess != skip
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if first:  # bounds the search before it begins
+            begin, end = -1, 0
+            depth += 1
+        else:
+            if enters(lower, upper, node, x, y, z, ix, iy, iz, nearest) == np.inf:
+                continue
+            if node < leaves:
+                left = enters(lower, upper, 2 * node, x, y, z, ix, iy, iz, nearest)
+                right = enters(lower, upper, 2 * node + 1, x, y, z, ix, iy, iz, nearest)
+                near = 2 * node if left <= right else 2 * node + 1
+                if max(left, right) < np.inf:
+                    stack[depth] = 4 * node + 1 - near
+                    depth += 1
+                if min(left, right) < np.inf:
+                    stack[depth] = near
+                    depth += 1
+                continue
+            begin = LEAF * (node - leaves)
+            end = begin + LEAF
+        for slot in range(begin, end):
+            tri = guess if first else order[slot]
+            if tri < 0 or tri == skip:
+                continue
+            nx, ny, nz = planes[tri, 0], planes[tri, 1], planes[tri, 2]
+            height = nx * x + ny * y + nz * z + planes[tri, 3]
+            facing = nx * dx + ny * dy + nz * dz
+            if side != 2 and abs(height) <= tolerance and inset(planes, tri, x, y, z) >= -tolerance:
+                onward = facing * side < 0.0 if side != 0 else facing * (nx * bx + ny * by + nz * bz) > 0.0
+                if not onward:
+                    continue
+                path = 0.0
+            else:
+                if facing == 0.0:
+                    continue
+                path = -height / facing
+                if not (path > 0.0 and path <= nearest):
+                    continue
+                if not crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
+                    continue
+            if path < nearest or (path == nearest and tri < best):
+                nearest, best = path, tri
+        first = False
+    return nearest, best
+
+
+@jit
+def first_hits(start, direction, skip, limit, planes, corners, order, lower, upper, tolerance):
+    """First hit of each ray beyond its start, in float64 alone: path and triangle, -1 if none before `limit`.
+
+    `start` (n, 3), `limit` (n,) in the unit box; `skip` (n,) is a triangle to be passed over.
+    """
+    path, triangle = np.empty(len(start)), np.empty(len(start), np.int64)
+    for i in range(len(start)):
+        path[i], triangle[i] = decide(
+            start[i, 0], start[i, 1], start[i, 2], direction[i, 0], direction[i, 1], direction[i, 2], skip[i],
+            -1, limit[i], 2, 0.0, 0.0, 0.0, planes, corners, order, lower, upper, tolerance,
+        )  # fmt: skip
+    return path, triangle

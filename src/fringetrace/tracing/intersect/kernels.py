@@ -1,0 +1,335 @@
+"""Compiled loops from rays to hits: what Embree is asked, when it is doubted, and what float64 makes of it.
+
+A body is a mesh moved and scaled by a power of two into the unit box; lengths in here are in
+that unit unless said otherwise. `planes` has 16 numbers a triangle: its plane n.p + c = 0 with
+n unit, then three edge planes whose value is the distance inside each edge. A `body` is what
+`bodies.Body.packed` makes of it.
+
+Functions that take arrays within a loop over rays are inlined and without branches (`part`), or called for
+few of the rays: numba counts references to arrays at each call, and threads wait for each other there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fringetrace.core import jit, part
+from fringetrace.tracing.intersect.exact import decide, enters, inset, inverse
+
+# float32 resolves 2**-24 of the unit box; eight such steps separate a restart from its surface.
+SHIFT = 2.0**-20
+# Nearer than this to an edge, or to the start, float32 does not decide.
+MARGIN = 8.0 * SHIFT
+# A ray leaving flatter than this (cosine to the normal) grazes.
+GRAZING = 0.125
+# A fold with normals nearer than this (cosine) is gentle: a ray steeper than STEEP (cosine to the
+# normal) cannot meet both of its faces, 26 degrees against 30.
+GENTLE, STEEP = 0.9, 0.5
+# On a body that the ray has not just left, Embree starts this far behind the ray.
+BEHIND = 2.0**-18
+# The second opinion on a suspicious answer comes from this far aside.
+ASIDE = 2.0**-19
+
+# Columns of a batch's `state`: origin, direction, normal of the face last left, optical path (metres),
+# distance of the start from that face's nearest edge (unit box), cosine of the ray to that normal.
+OX, OY, OZ, DX, DY, DZ, NX, NY, NZ, WAY, EDGE, LEAVING = range(12)
+# Columns of `met`: path to what a ray meets next, the point (metres), the normal, distance from the edge.
+PATH, PX, PY, PZ, FX, FY, FZ, RIM = range(8)
+
+
+@part
+def restart(x, y, z, dx, dy, dz, nx, ny, nz, leaving, per):
+    """A point `SHIFT` above the face that a ray leaves at the cosine `leaving`, one over `per`.
+
+    Along the ray: aside, it would pass silhouettes on the wrong side. A grazing ray takes the
+    rest along the normal.
+    """
+    if abs(leaving) > GRAZING:
+        step = SHIFT * per
+        return x + step * dx, y + step * dy, z + step * dz
+    step = SHIFT / GRAZING
+    side = (SHIFT if leaving > 0.0 else -SHIFT) - step * leaving
+    return x + step * dx + side * nx, y + step * dy + side * ny, z + step * dz + side * nz
+
+
+@jit
+def aim(
+    total, state, last, frame, first, stop, owner, members, flat, lower, upper, cull, met, triangle, fresh,
+    origin32, direction32, sent,
+):  # fmt: skip
+    """Collect, in float32 and the unit box of a body, the rays that can meet it; return how many.
+
+    `members` are the body's surfaces, in boxes `lower` to `upper`; from a `flat` one a ray does not
+    come back to it. A ray that just left this body restarts `SHIFT` above its last triangle; one
+    from outside starts at the bounding sphere. `cull`: leave out those that cannot meet anything.
+    `fresh`: forget what each ray met before.
+    """
+    cx, cy, cz, scale, radius = frame[0], frame[1], frame[2], frame[3], frame[4]
+    count = 0
+    for row in range(total):
+        if fresh:
+            met[row, PATH], triangle[row] = np.inf, -1
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        x = (state[row, OX] - cx) * scale
+        y = (state[row, OY] - cy) * scale
+        z = (state[row, OZ] - cz) * scale
+        own = first <= last[row] < stop
+        step = 0.0
+        if not own:
+            along = x * dx + y * dy + z * dz
+            qx, qy, qz = x - along * dx, y - along * dy, z - along * dz
+            square = radius * radius - (qx * qx + qy * qy + qz * qz)
+            if square < 0.0:
+                continue
+            reach = np.sqrt(square)
+            if along > reach:
+                continue
+            step = -along - reach if along < -reach else -BEHIND
+        if cull and (len(members) > 1 or (own and flat[0])):
+            ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
+            left = owner[last[row]] if own else -1
+            hopeful = False
+            for s in range(len(members)):
+                if members[s] == left:
+                    hopeful |= not flat[s]
+                else:
+                    hopeful |= enters(lower, upper, s, x, y, z, ix, iy, iz, np.inf) < np.inf
+            if not hopeful:
+                continue
+        if own:
+            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+            leaving = nx * dx + ny * dy + nz * dz
+            state[row, LEAVING] = leaving
+            x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz, leaving, 1.0 / abs(leaving))
+        else:
+            x, y, z = x + step * dx, y + step * dy, z + step * dz
+        origin32[count, 0], origin32[count, 1], origin32[count, 2] = x, y, z
+        direction32[count, 0], direction32[count, 1], direction32[count, 2] = dx, dy, dz
+        sent[count] = row
+        count += 1
+    return count
+
+
+@jit
+def suspect(sent, count, prim, state, last, body, origin32, leaving, asked):
+    """List the rays whose answer wants other opinions, of those that are just `leaving` the body or not.
+
+    Embree has holes at exact vertices, and float32 blurs the rim of an open body. Suspicious are
+    misses of an open body, and, of rays that have not just left it, misses of a closed body from
+    within its bounding sphere and hits on its inside. Returns how many.
+    """
+    first, stop, _, closed, frame, planes, _, _ = body
+    found = 0
+    inner = (1.0 - 1e-4) * frame[4] * frame[4]
+    for i in range(count):
+        row = np.uintp(sent[i])
+        tri = prim[i]
+        if (first <= last[row] < stop) != leaving:
+            continue
+        if closed and tri >= 0:
+            facing = planes[tri, 0] * state[row, DX] + planes[tri, 1] * state[row, DY]
+            if facing + planes[tri, 2] * state[row, DZ] <= 0.0:
+                continue
+        elif closed:
+            if origin32[i, 0] ** 2 + origin32[i, 1] ** 2 + origin32[i, 2] ** 2 >= inner:
+                continue
+        elif tri >= 0:
+            continue
+        asked[found] = i
+        found += 1
+    return found
+
+
+@jit
+def beside(sent, asked, found, state, last, body, origin32, turn, moved, heading):
+    """Move suspicious rays `ASIDE`, across themselves, to the side `turn` (0, 1, 2: 120 degrees apart).
+
+    Whichever way a rim runs, one of the three sides is well inside it. None goes through the face
+    just left.
+    """
+    first, stop = body[0], body[1]
+    cos, sin = np.cos(2.0 * np.pi * turn / 3.0), np.sin(2.0 * np.pi * turn / 3.0)
+    for i in range(found):
+        row = np.uintp(sent[asked[i]])
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        # u and v across the ray, from the axis that it is least along
+        if abs(dx) <= abs(dy) and abs(dx) <= abs(dz):
+            ux, uy, uz = 0.0, dz, -dy
+        elif abs(dy) <= abs(dz):
+            ux, uy, uz = -dz, 0.0, dx
+        else:
+            ux, uy, uz = dy, -dx, 0.0
+        size = ASIDE / np.sqrt(ux * ux + uy * uy + uz * uz)
+        ux, uy, uz = ux * size, uy * size, uz * size
+        vx, vy, vz = dy * uz - dz * uy, dz * ux - dx * uz, dx * uy - dy * ux
+        ax, ay, az = cos * ux + sin * vx, cos * uy + sin * vy, cos * uz + sin * vz
+        if first <= last[row] < stop:
+            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+            up = ax * nx + ay * ny + az * nz
+            if up * (nx * dx + ny * dy + nz * dz) < 0.0:
+                ax, ay, az = ax - up * nx, ay - up * ny, az - up * nz
+        moved[i, 0] = origin32[asked[i], 0] + ax
+        moved[i, 1] = origin32[asked[i], 1] + ay
+        moved[i, 2] = origin32[asked[i], 2] + az
+        heading[i, 0], heading[i, 1], heading[i, 2] = dx, dy, dz
+
+
+@jit
+def softly(planes, tri, x, y, z, folds, margin):
+    """Whether all edges of a triangle that a point is nearer to than `margin` have gentle folds (bits)."""
+    for k in range(3):
+        e = 4 * k + 4
+        height = planes[tri, e] * x + planes[tri, e + 1] * y + planes[tri, e + 2] * z + planes[tri, e + 3]
+        if height < margin and not (folds >> k) & 1:
+            return False
+    return True
+
+
+@part
+def crossing(planes, tri, x, y, z, dx, dy, dz):
+    """Where a ray crosses the plane of a triangle: its cosine to the normal, one over that, path, point, rim.
+
+    The rim is the distance of the point inside the nearest edge.
+    """
+    facing = planes[tri, 0] * dx + planes[tri, 1] * dy + planes[tri, 2] * dz
+    height = planes[tri, 0] * x + planes[tri, 1] * y + planes[tri, 2] * z + planes[tri, 3]
+    inverted = 1.0 / facing
+    path = -height * inverted
+    px, py, pz = x + path * dx, y + path * dy, z + path * dz
+    return facing, inverted, path, px, py, pz, inset(planes, tri, px, py, pz)
+
+
+@part
+def unsure(guess, again, path, facing, own, leaving, closed):
+    """Whether float32 does not decide, edges left aside; `again`: it names the triangle just left."""
+    if guess < 0:
+        return (guess == -2) | (own & closed & (leaving < 0.0))
+    measurable = (path > MARGIN) & (path < 1e300)
+    return (not measurable) | (own & (again | (closed & (facing * leaving >= 0.0))))
+
+
+@jit
+def clamped(planes, tri, x, y, z):
+    """A point put back inside the edges of a triangle, and how far inside it was."""
+    rim = np.inf
+    for k in range(4, 16, 4):
+        ex, ey, ez = planes[tri, k], planes[tri, k + 1], planes[tri, k + 2]
+        height = ex * x + ey * y + ez * z + planes[tri, k + 3]
+        rim = min(rim, height)
+        if height < 0.0:
+            x, y, z = x - height * ex, y - height * ey, z - height * ez
+    return x, y, z, rim
+
+
+@jit
+def decided(ray, came, normal, left, leaving, guess, limit, body):
+    """Exact hit of a doubtful ray before `limit`: triangle, path, a point inside its edges, rim."""
+    _, _, oriented, closed, frame, planes, _, (corners, order, lower, upper) = body
+    x, y, z, dx, dy, dz = ray
+    bx, by, bz = came
+    radius, tolerance = frame[4], frame[6]
+    along = x * dx + y * dy + z * dz
+    start = 0.0
+    if along < -2.0 * radius:  # far off: decide from near the body
+        start = -along - 1.5 * radius
+        x, y, z = x + start * dx, y + start * dy, z + start * dz
+    side = 0
+    if left == -2 or start > 0.0:
+        side = 2
+    elif left >= 0 and oriented:
+        side = 1 if leaving > 0.0 else -1
+    skip = left if left >= 0 else np.int64(-1)
+    path, tri = decide(
+        x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
+        tolerance,
+    )  # fmt: skip
+    if tri < 0 and side == -1 and closed and limit == np.inf:
+        # along a face to the very edge of the next: from a little further inside it cannot be missed
+        nx, ny, nz = normal
+        x, y, z = x - 8.0 * tolerance * nx, y - 8.0 * tolerance * ny, z - 8.0 * tolerance * nz
+        path, tri = decide(
+            x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
+            tolerance,
+        )  # fmt: skip
+    rim = np.inf
+    if tri >= 0:
+        x, y, z, rim = clamped(planes, tri, x + path * dx, y + path * dy, z + path * dz)
+    return tri, (start + path, x, y, z, rim)
+
+
+@jit
+def reviewed(ray, came, normal, left, leaving, edge, guess, facing, hit, doubt, body):
+    """Second look at a hit in doubt or near an edge: whether float32 does not decide, triangle, hit.
+
+    `left` is the triangle of this body that the ray just left, at the cosine `leaving` and `edge` away
+    from its nearest edge; -1: one of another body, -2: none. `hit` is path, point and rim.
+    """
+    frame, planes, gentle = body[4], body[5], body[6]
+    x, y, z = ray[0], ray[1], ray[2]
+    _, px, py, pz, rim = hit
+    if guess >= 0 and rim <= MARGIN:
+        steep = rim > 4.0 * frame[6] and abs(facing) > STEEP
+        doubt |= not (steep and softly(planes, guess, px, py, pz, gentle[guess], MARGIN))
+    near = left >= 0 and edge < frame[5]
+    if near and abs(leaving) > STEEP:
+        near = not softly(planes, left, x, y, z, gentle[left], frame[5])
+    if not (doubt or near):
+        return False, guess, hit
+    # near an edge the step off the surface may have jumped something; beyond it Embree is right, if the
+    # step went along the ray
+    local = not doubt and abs(leaving) > GRAZING
+    limit = 2.0 * MARGIN if local else np.inf
+    tri, exact = decided(ray, came, normal, left, leaving, np.int64(-1) if local else guess, limit, body)
+    if tri >= 0 or not local:
+        return True, tri, exact
+    return True, guess, hit
+
+
+@jit
+def measure(sent, count, prim, state, last, came, body, met, triangle):
+    """Turn Embree's triangle numbers into float64 hits; decide the doubtful ones exactly.
+
+    Keeps a hit where it is nearer than the one in `met`. Returns how many were doubtful.
+    """
+    first, stop, _, closed, frame, planes, _, _ = body
+    cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
+    unscale, margin = 1.0 / scale, frame[5]
+    doubtful = 0
+    for i in range(count):
+        row = np.uintp(sent[i])
+        guess = np.int64(prim[i])
+        own = first <= last[row] < stop
+        if guess == -1 and not own:
+            continue
+        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
+        nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
+        x = (state[row, OX] - cx) * scale
+        y = (state[row, OY] - cy) * scale
+        z = (state[row, OZ] - cz) * scale
+        leaving = nx * dx + ny * dy + nz * dz
+        left = last[row] - first if own else np.int64(-1 if last[row] >= 0 else -2)
+        edge = state[row, EDGE] if own else np.inf
+        facing, path, px, py, pz, rim = 0.0, np.inf, x, y, z, np.inf
+        if guess >= 0:
+            k = np.uintp(guess)
+            facing, _, path, px, py, pz, rim = crossing(planes, k, x, y, z, dx, dy, dz)
+        doubt = unsure(guess, guess == left, path, facing, own, leaving, closed)
+        if doubt or rim <= MARGIN or edge < margin:
+            unclear, guess, (path, px, py, pz, rim) = reviewed(
+                (x, y, z, dx, dy, dz), (came[row, 0], came[row, 1], came[row, 2]), (nx, ny, nz), left,
+                leaving, edge, guess, facing, (path, px, py, pz, rim), doubt, body,
+            )  # fmt: skip
+            doubtful += unclear
+        if guess < 0 or not path * unscale < met[row, PATH]:
+            continue
+        # rounding left the point a little off its plane: put it back
+        k = np.uintp(guess)
+        nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
+        height = nx * px + ny * py + nz * pz + planes[k, 3]
+        triangle[row] = first + guess
+        met[row, PATH], met[row, RIM] = path * unscale, rim
+        met[row, PX] = cx + (px - height * nx) * unscale
+        met[row, PY] = cy + (py - height * ny) * unscale
+        met[row, PZ] = cz + (pz - height * nz) * unscale
+        met[row, FX], met[row, FY], met[row, FZ] = nx, ny, nz
+    return doubtful

@@ -1,0 +1,329 @@
+"""Between finding a hit and what happens there: hits on facets are moved onto the exact form behind them.
+
+Facets and form stand apart by the sag of the facets, so three things have to be told from true hits.
+A ray that has just left a form may cross facets before it is clear of them: such a crossing leads
+back to the point it started from. A ray may cross a facet where the form is not. And a flat chord
+of a hollow, or a graze of a rim, may lie between facets and form, where no facet is crossed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import Array, FloatArray
+from fringetrace.geometry import Fit, LevelFit, Meeting, dot
+from fringetrace.scene import Scene
+from fringetrace.tracing.batch import Batch
+from fringetrace.tracing.intersect.bodies import Body
+from fringetrace.tracing.intersect.embree import Engine, Hits, find as find_facets
+
+# A crossing that leads back to within this part of the body's size of the start is the start.
+START = 1e-9
+# Room in front of the form, in sags of the facets, from which its facet is looked for.
+REACH = 2.0
+# A facet stands for the form no farther along a ray than this many of its longest sides.
+SIDES = 2.0
+# A ray crosses so many facets that lead nowhere before it is given up.
+CROSSINGS = 64
+# Where a bent form is not met from the nearest guess, guesses are this part of a side apart.
+APART = 0.25
+# Rays that leave more steeply (cosine to the normal) come out from behind the facets at once.
+FLAT = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Formed:
+    """A surface with a form, alone in its body: the fit, and the longest side of its faces in metres."""
+
+    surface: int
+    body: Body
+    fit: Fit
+    side: float
+
+
+def formed(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
+    """The surfaces of a scene that have a form; fitted once and kept with the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    engine : Engine
+        In which each of them has a body of its own.
+
+    Returns
+    -------
+    tuple of Formed
+    """
+    name = f"forms {[body.surfaces for body in engine.bodies]}"
+    if name in scene.derived:
+        kept: tuple[Formed, ...] = scene.derived[name]
+        return kept
+    found = []
+    for i, surface in enumerate(scene.surfaces):
+        if surface.form is None:
+            continue
+        body = next(body for body in engine.bodies if body.surfaces == (i,))
+        body.prepare()
+        corners = surface.mesh.vertices[surface.mesh.faces]
+        sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        fit = surface.form.fit(surface.mesh.vertices, surface.mesh.faces)
+        found.append(Formed(i, body, fit, float(sides.max())))
+    scene.derived[name] = tuple(found)
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Some rays of a batch as a form sees them.
+
+    `own` tells whether they have just left the form, `leaving` on which side of it: 1 where the
+    ray goes along the gradient, -1 against it. `up` is the normal there, to the side that they went to.
+    """
+
+    origin: FloatArray
+    direction: FloatArray
+    last: npt.NDArray[np.int64]
+    own: npt.NDArray[np.bool_]
+    leaving: FloatArray
+    up: FloatArray
+
+    def part(self, rows: Array) -> _Rays:
+        """Some of them."""
+        return _Rays(*(column[rows] for column in vars(self).values()))
+
+
+def _seen(form: Formed, batch: Batch, rows: Array) -> _Rays:
+    state, body = batch.state[rows], form.body
+    last = batch.last[rows] - body.first
+    own = (last >= 0) & (last < len(body.faces))
+    along = np.where(own, form.fit.along[np.where(own, last, 0)], 0)
+    facing = np.sign(np.einsum("ij,ij->i", state[:, 6:9], state[:, 3:6]))
+    up = facing[:, None] * state[:, 6:9]
+    return _Rays(state[:, :3], state[:, 3:6], np.where(own, last, -1), own & (along != 0), facing * along, up)
+
+
+def _first(form: Formed, start: FloatArray, direction: FloatArray, skip: Array, limit: Array) -> tuple[
+    FloatArray, npt.NDArray[np.int64]
+]:  # fmt: skip
+    """First facets that rays cross, exactly: path in metres, and the face, -1 if none before `limit`."""
+    from fringetrace.tracing.intersect import exact
+
+    body, tree = form.body, form.body.tree
+    centre, scale = body.frame[:3], body.frame[3]
+    path, face = exact.first_hits(
+        (start - centre) * scale, direction, skip, limit * scale, body.planes, tree.corners, tree.order,
+        tree.lower, tree.upper, body.frame[6],
+    )  # fmt: skip
+    return path / scale, face
+
+
+def _false(form: Formed, rays: _Rays, crossed: FloatArray, side: FloatArray, met: Meeting) -> Array:
+    """Which crossings of facets, at `crossed` metres, lead to no hit of the form."""
+    near = START / form.body.frame[3]
+    # the start itself is a crossing in the sense in which the ray leaves
+    same = rays.own & (side == rays.leaving)
+    least = np.where(same, np.maximum(0.5 * crossed, near), 0.0)
+    return ~((met.path > least) & (np.abs(met.path - crossed) <= SIDES * form.side))
+
+
+def _nearby(
+    form: Formed, rays: _Rays, path: FloatArray, side: FloatArray, face: Array, steps: range
+) -> Meeting:
+    """First hits of a form from several guesses along each ray: it may bend within a facet's length."""
+    best = _nothing(len(path))
+    for step in steps:
+        guess = path + step * APART * form.side
+        met = form.fit.meet(rays.origin, rays.direction, guess, side, face)
+        true = (met.path > 0.0) & (met.path < best.path) & (np.abs(met.path - guess) <= form.side)
+        _keep(best, np.flatnonzero(true), met, true)
+    return best
+
+
+def _nothing(count: int) -> Meeting:
+    return Meeting(np.full(count, np.inf), np.zeros((count, 3)), np.zeros((count, 3)), np.full(count, -1))
+
+
+def _keep(best: Meeting, rows: Array, met: Meeting, chosen: Array) -> None:
+    for column, found in zip(vars(best).values(), vars(met).values(), strict=True):
+        column[rows] = found[chosen]
+
+
+def _through_facets(form: Formed, rays: _Rays, crossed: FloatArray, face: Array) -> Meeting:
+    """Hits of the form that the facets lead to, the first of each ray, from the first facet crossed on."""
+    best = _nothing(len(face))
+    rows = np.flatnonzero(face >= 0)
+    crossed, face = crossed.copy(), face.copy()
+    entering = np.where(rays.own, -rays.leaving, 0.0)
+    for _ in range(CROSSINGS):
+        some = rays.part(rows)
+        along = form.fit.along[face[rows]]
+        facing = np.einsum("ij,ij->i", form.body.planes[face[rows], :3], some.direction)
+        side = np.sign(facing) * np.where(along == 0, 1, along)
+        met = form.fit.meet(some.origin, some.direction, crossed[rows], side, face[rows])
+        entering[rows] = np.where(entering[rows] == 0.0, side, entering[rows])
+        false = _false(form, some, crossed[rows], side, met) & (along != 0)
+        again = np.flatnonzero(false & (side == entering[rows]))
+        if len(again) and not form.fit.complete:
+            few = some.part(again)
+            steps = range(-4, 9)
+            second = _nearby(form, few, crossed[rows[again]], side[again], face[rows[again]], steps)
+            found = np.isfinite(second.path)
+            _keep(met, again[found], second, found)
+            false[again[found]] = False
+        flat = np.flatnonzero(along == 0)  # a face that is none of the form's counts as it is
+        met.path[flat] = crossed[rows[flat]]
+        met.point[flat] = some.origin[flat] + met.path[flat, None] * some.direction[flat]
+        met.normal[flat] = form.body.planes[face[rows[flat]], :3]
+        met.face[flat] = face[rows[flat]]
+        true = ~false
+        _keep(best, rows[true], met, true)
+        rows, some = rows[false], some.part(false)
+        if len(rows) == 0:
+            break
+        start = some.origin + crossed[rows, None] * some.direction
+        onward, face[rows] = _first(form, start, some.direction, face[rows], np.full(len(rows), np.inf))
+        crossed[rows] += onward
+        rows = rows[face[rows] >= 0]
+    return best
+
+
+def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
+    """Hits of the form before those found, where a facet is near though the ray crosses none."""
+    near = START / form.body.frame[3]
+    for sense in (-1.0, 1.0):
+        # a line crosses a quadric once in each sense: not again where it started, nor where it is found
+        found = np.isfinite(best.path) & (form.fit.along[best.face] != 0)
+        found &= np.einsum("ij,ij->i", best.normal, rays.direction) * sense > 0.0
+        untried = ~found if form.fit.complete else rays.own
+        rows = np.flatnonzero(untried & ~(rays.own & (rays.leaving == sense)))
+        if isinstance(form.fit, LevelFit) and form.fit.complete:
+            rows = rows[_beside(form, form.fit, rays.part(rows), sense)]
+        some, side = rays.part(rows), np.full(len(rows), sense)
+        met = form.fit.meet(some.origin, some.direction, np.zeros(len(rows)), side, some.last)
+        wanted = (met.path > 0.0) & (met.path < best.path[rows] * (1.0 - START))
+        kept = np.flatnonzero(wanted)
+        reach = REACH * form.fit.sag + near
+        start, down = met.point[kept] + reach * met.normal[kept], -met.normal[kept]
+        nothing = np.full(len(kept), -1)
+        _, face = _first(form, start, down, nothing, np.full(len(kept), 2.0 * reach))
+        there = (face >= 0) & (form.fit.along[face] != 0)
+        kept, face = kept[there], face[there]
+        met.face[kept] = face
+        _keep(best, rows[kept], met, kept)
+
+
+def _beside(form: Formed, fit: LevelFit, rays: _Rays, sense: float) -> npt.NDArray[np.bool_]:
+    """Whether rays meet a quadric, in a sense, where its facets are, or at least in the box around them."""
+    body = form.body
+    centre, room = body.frame[:3], 2.0 * REACH * fit.sag
+    nearest = dot(centre - rays.origin, rays.direction)
+    start = rays.origin + nearest[:, None] * rays.direction
+    way = fit.guess(start, rays.direction, np.full(len(start), sense))
+    lower, upper = (corner[0] / body.frame[3] for corner in body.boxes)
+    with np.errstate(invalid="ignore"):
+        place = start + way[:, None] * rays.direction - centre
+    return np.asarray(((place >= lower - room) & (place <= upper + room)).all(axis=1))
+
+
+def _hidden(form: Formed, rays: _Rays, crossed: FloatArray, crossing: Array, best: Meeting) -> None:
+    """Hits of a bent form by rays that left it behind its facets and are long in coming out."""
+    flat = np.abs(np.einsum("ij,ij->i", rays.up, rays.direction)) < FLAT
+    rows = np.flatnonzero(rays.own & flat & (crossed > APART * form.side))
+    reach = REACH * form.fit.sag + START / form.body.frame[3]
+    above = rays.origin[rows] + reach * rays.up[rows]
+    limit = np.full(len(rows), reach)
+    _, face = _first(form, above, -rays.up[rows], np.full(len(rows), -1), limit)
+    outward = np.einsum("ij,ij->i", form.body.planes[crossing[rows], :3], rays.direction[rows])
+    emerging = (crossing[rows] >= 0) & (
+        np.sign(outward) * form.fit.along[crossing[rows]] == rays.leaving[rows]
+    )
+    rows = rows[(face >= 0) | emerging]
+    if len(rows) == 0:
+        return
+    few = rays.part(rows)
+    found = _nearby(form, few, np.zeros(len(rows)), -few.leaving, few.last, range(1, 17))
+    nearer = found.path < best.path[rows]
+    _keep(best, rows[nearer], found, nearer)
+
+
+def _passing(form: Formed, batch: Batch, rows: int, within: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which rays pass the box around a form before they have gone so far, in metres, or little farther."""
+    body = form.body
+    centre, scale = body.frame[:3], body.frame[3]
+    room = (2.0 * REACH * form.fit.sag + SIDES * form.side) * scale
+    origin, direction = (batch.state[:rows, :3] - centre) * scale, batch.state[:rows, 3:6]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        one, other = (
+            (corner[0] - origin) / direction for corner in (body.boxes[0] - room, body.boxes[1] + room)
+        )
+    along = np.isnan(one) | np.isnan(other)  # in the plane of a side
+    enter = np.where(along, -np.inf, np.minimum(one, other)).max(axis=1)
+    leave = np.where(along, np.inf, np.maximum(one, other)).min(axis=1)
+    return np.asarray((leave >= np.maximum(enter, 0.0)) & (enter <= within * scale + room))
+
+
+def _refined(
+    form: Formed, batch: Batch, rows: int, facets: Hits, within: FloatArray
+) -> tuple[Array, Meeting]:
+    """Rows of the batch that meet a form before they have gone `within` metres, and where."""
+    wanted = _passing(form, batch, rows, within)
+    if not form.fit.complete:
+        last = batch.last[:rows] - form.body.first
+        wanted &= ((last >= 0) & (last < len(form.body.faces))) | (facets.triangle[:rows] >= 0)
+    chosen = np.flatnonzero(wanted)
+    rays = _seen(form, batch, chosen)
+    face, crossed = facets.triangle[chosen], facets.met[chosen, 0]
+    face = np.where(face >= 0, face - form.body.first, -1)
+    best = _through_facets(form, rays, crossed, face)
+    _between(form, rays, best)
+    if not form.fit.complete:
+        _hidden(form, rays, crossed, face, best)
+    hit = np.isfinite(best.path) & (best.path < within[chosen])
+    return chosen[hit], Meeting(*(column[hit] for column in vars(best).values()))
+
+
+def find(
+    engine: Engine,
+    forms: tuple[Formed, ...],
+    batch: Batch,
+    rows: int,
+    hits: Hits,
+    passed: frozenset[int] = frozenset(),
+) -> int:
+    """Nearest hit of each ray, written into `hits`, those of surfaces with a form on it.
+
+    Parameters
+    ----------
+    engine : Engine
+        In which surfaces with a form have a body of their own.
+    forms : tuple of Formed
+    batch, rows, hits, passed
+        See `fringetrace.tracing.intersect.embree.find`.
+
+    Returns
+    -------
+    int
+        How many rays were decided exactly.
+    """
+    everything = frozenset(range(len(engine.offset)))
+    doubtful = find_facets(engine, batch, rows, hits, passed | {form.surface for form in forms})
+    facets = Hits.blank(rows)
+    for form in forms:
+        if form.surface in passed:
+            continue
+        doubtful += find_facets(engine, batch, rows, facets, everything - {form.surface})
+        chosen, met = _refined(form, batch, rows, facets, hits.met[:rows, 0])
+        face = met.face
+        along = form.fit.along[face]
+        hits.met[chosen, 0] = met.path
+        hits.met[chosen, 1:4] = met.point
+        hits.met[chosen, 4:7] = met.normal * np.where(along == 0, 1, along)[:, None]
+        local = (met.point - form.body.frame[:3]) * form.body.frame[3]
+        edges = form.body.planes[face].reshape(-1, 4, 4)[:, 1:]
+        inside = np.einsum("nek,nk->ne", edges[:, :, :3], local) + edges[:, :, 3]
+        hits.met[chosen, 7] = inside.min(axis=1)
+        hits.triangle[chosen] = form.body.first + face
+    return doubtful

@@ -1,0 +1,261 @@
+"""The media of a scene at a wavelength, as the kernels read them; paths at another wavelength."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import Array, ComplexArray, checked_wavelength
+from fringetrace.optics import Dielectric, Metal
+from fringetrace.scene import Scene, Surface
+
+if TYPE_CHECKING:
+    from fringetrace.optics import Element, Material
+
+# As in `refractions`, which takes a second to load.
+CONSTANT, BOUNDARY = 0, 1
+REFLECTED, TRANSMITTED, OPAQUE = 1, 2, 4
+FOLLOW = {"both": REFLECTED | TRANSMITTED, "reflected": REFLECTED, "transmitted": TRANSMITTED}
+# Beyond, float64 keeps nothing of the squares of other indices beside them.
+INDICES = 1e-7, 1e7
+
+
+@dataclass(frozen=True, eq=False)
+class Optics:
+    """What the kernels of `refractions` need to know of a scene.
+
+    Attributes
+    ----------
+    kind, reflection, transmission, front, back, media, follow
+        For each surface what it is, its amplitudes if they are constant, the numbers of its media, which
+        branches are followed; of each medium the complex index.
+    film : tuple
+        Where the layers of each surface begin, and their indices and thicknesses from front to back and
+        from back to front.
+    k0 : float, 1/m
+        2 pi over the wavelength, 0 where nothing depends on it.
+    wavelength : float or None, metres
+    polarised : bool
+    elements : dict
+        Thin elements by the number of their surface.
+    """
+
+    kind: npt.NDArray[np.int8]
+    reflection: ComplexArray
+    transmission: ComplexArray
+    front: npt.NDArray[np.int32]
+    back: npt.NDArray[np.int32]
+    media: ComplexArray
+    follow: npt.NDArray[np.int8]
+    film: tuple[Array, ComplexArray, Array, tuple[ComplexArray, Array]]
+    k0: float
+    wavelength: float | None
+    polarised: bool
+    elements: dict[int, Element]
+
+    @property
+    def columns(self) -> tuple[Array, ...]:
+        """The tables of surfaces and media."""
+        return (
+            self.kind, self.reflection, self.transmission, self.front, self.back, self.media, self.follow,
+        )  # fmt: skip
+
+    @property
+    def fading(self) -> bool:
+        """Whether some medium absorbs."""
+        return bool(self.media.imag.any())
+
+    @property
+    def branches(self) -> int:
+        """Branches that a ray may split into at one surface."""
+        return max([2, *(element.branches for element in self.elements.values())])
+
+
+def materials(scene: Scene) -> tuple[Material, ...]:
+    """The media of a scene by their numbers, first that around it.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    tuple of Material
+    """
+    found = [scene.around]
+    for surface in scene.surfaces:
+        found += [medium for medium in (surface.front, surface.back) if medium is not None]
+    return tuple(dict.fromkeys(found))
+
+
+def _film(surface: Surface) -> tuple[tuple[Material, float], ...]:
+    film = surface.interface.film if isinstance(surface.interface, (Dielectric, Metal)) else None
+    return () if film is None else film.layers
+
+
+def plain(scene: Scene, polarised: bool) -> bool:
+    """Whether light meets nothing but constant amplitudes in a vacuum.
+
+    Parameters
+    ----------
+    scene : Scene
+    polarised : bool
+
+    Returns
+    -------
+    bool
+    """
+    acting = any(surface.boundary or hasattr(surface.interface, "act") for surface in scene.surfaces)
+    if acting or polarised:
+        return False
+    around = scene.medium
+    return around is None or not (around.dispersive or complex(around.index(1.0)) != 1.0)
+
+
+def needs(scene: Scene) -> str | None:
+    """What in a scene depends on the wavelength, in words; None if nothing does.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    str or None
+    """
+    for medium in materials(scene):
+        if medium.dispersive:
+            return f"{medium.name} is dispersive"
+        if complex(medium.index(1.0)).imag != 0.0:
+            return f"{medium.name} absorbs"
+    for surface in scene.surfaces:
+        if _film(surface):
+            return f"{surface.name} has a film"
+        if getattr(surface.interface, "chromatic", False):
+            return f"{surface.name} depends on it"
+    return None
+
+
+def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | None:
+    """The media, boundaries and elements of a scene at a wavelength.
+
+    Parameters
+    ----------
+    scene : Scene
+    wavelength : float or None, metres
+        Not needed where nothing depends on it.
+    polarised : bool
+
+    Returns
+    -------
+    Optics or None
+        None where light meets nothing but constant amplitudes in a vacuum.
+
+    Raises
+    ------
+    ValueError
+        If the wavelength is missing, is none, or lies outside the range of a material; if an index is
+        beyond `INDICES`; if an element needs light of a polarisation that has none.
+    """
+    if wavelength is not None:
+        wavelength = checked_wavelength(wavelength)
+    if plain(scene, polarised):
+        return None
+    why = needs(scene)
+    if wavelength is None and why is not None:
+        raise ValueError(f"trace wavelength: expected one, since {why}, got None")
+    elements = thin(scene)
+    for number, element in elements.items():
+        if element.polarised and not polarised:
+            name = scene.surfaces[number].name
+            raise ValueError(f"{name}: expected light with a polarisation, got a scalar beam")
+    known = materials(scene)
+    at = 1.0 if wavelength is None else wavelength
+    numbers = {medium: number for number, medium in enumerate(known)}
+    sides = [[s.front or scene.around, s.back or scene.around] for s in scene.surfaces]
+    table = np.array([[numbers[medium] for medium in side] for side in sides], dtype=np.int32)
+    reflection, transmission = constants(scene)
+    return Optics(
+        kind=np.array([BOUNDARY if s.boundary else CONSTANT for s in scene.surfaces], dtype=np.int8),
+        reflection=reflection,
+        transmission=transmission,
+        front=table[:, 0].copy(),
+        back=table[:, 1].copy(),
+        media=np.array([_index(medium, at) for medium in known]),
+        follow=np.array([_followed(surface) for surface in scene.surfaces], dtype=np.int8),
+        film=_layers(scene, at),
+        k0=0.0 if wavelength is None else 2.0 * math.pi / wavelength,
+        wavelength=wavelength,
+        polarised=polarised,
+        elements=elements,
+    )
+
+
+def _index(medium: Material, wavelength: float) -> complex:
+    """Index of a medium that the kernels can do with."""
+    index, (least, most) = complex(medium.index(wavelength)), INDICES
+    if not least <= abs(index) <= most:
+        raise ValueError(f"{medium.name}: expected an index of magnitude {least:g} to {most:g}, got {index}")
+    return index
+
+
+def thin(scene: Scene) -> dict[int, Element]:
+    """The thin elements of a scene, by the number of their surface.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    dict of int to Element
+    """
+    acting = ((i, surface.interface) for i, surface in enumerate(scene.surfaces))
+    return {i: cast("Element", interface) for i, interface in acting if hasattr(interface, "act")}
+
+
+def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
+    """Amplitudes of both branches of each surface where they are constant.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    reflection, transmission : (surfaces,) complex128
+        0 for boundaries; elements let all light through.
+    """
+    table = np.zeros((2, len(scene.surfaces)), dtype=np.complex128)
+    for number, surface in enumerate(scene.surfaces):
+        interface = surface.interface
+        if hasattr(interface, "act"):
+            table[1, number] = 1.0
+        elif not isinstance(interface, (Dielectric, Metal)):
+            table[:, number] = interface.reflection, interface.transmission
+    return table[0], table[1]
+
+
+def _followed(surface: Surface) -> int:
+    if isinstance(surface.interface, Metal):
+        return REFLECTED | OPAQUE
+    if isinstance(surface.interface, Dielectric):
+        return FOLLOW[surface.interface.follow]
+    return REFLECTED | TRANSMITTED
+
+
+def _layers(scene: Scene, wavelength: float) -> tuple[Array, ComplexArray, Array, tuple[ComplexArray, Array]]:
+    """The layers of all surfaces, those of each from the front and from the back."""
+    films = [_film(surface) for surface in scene.surfaces]
+    begin = np.cumsum([0, *(len(film) for film in films)])
+
+    def table(some: list[tuple[tuple[Material, float], ...]]) -> tuple[ComplexArray, Array]:
+        layers = [layer for film in some for layer in film]
+        index = np.array([_index(medium, wavelength) for medium, _ in layers], dtype=np.complex128)
+        return index, np.array([thickness for _, thickness in layers], dtype=np.float64)
+
+    return begin, *table(films), table([film[::-1] for film in films])

@@ -1,0 +1,265 @@
+"""A measurement on a bench next to the truth, and its files: PNG, TIFF, NetCDF."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import Array, FloatArray, tables
+from fringetrace.field import chosen
+from fringetrace.geometry import Mesh, interpolate_height, write_height_map
+from fringetrace.instruments import Bench, path_slope, records, stepped, tiff
+from fringetrace.scene import pixel_centres
+from fringetrace.tracing import Ledger
+
+if TYPE_CHECKING:
+    from xarray import Dataset
+
+# A bend of this many waves a pixel is a step.
+STEP = 0.02
+LIBRARIES = ("fringetrace", "numpy", "embreex", "numba", "scikit-image")
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What a bench recorded of a sample, and how the height found differs from that of the mesh.
+
+    Attributes
+    ----------
+    wavelength : float, metres
+    pitch : float, metres
+        Side of a pixel.
+    tilt : (tilt_x, tilt_y), radians
+    frames : (steps, rows, columns) float64
+        |E|^2 at equal phase steps; the first is the interferogram.
+    wrapped : (rows, columns) float64, radians
+    height, truth : (rows, columns) float64, metres
+        As measured, and of the mesh.
+    residual : (rows, columns) float64, metres
+        height - truth, less its mean (over pixels of the right fringe order): a height is measured
+        up to a constant. NaN where either is unknown.
+    smooth : (rows, columns) bool
+        Away from steps: the mesh changes by less than wavelength / 4 to each neighbour, and, where
+        pixels are averaged, evenly.
+    ledger : Ledger
+    """
+
+    wavelength: float
+    pitch: float
+    tilt: tuple[float, float]
+    frames: FloatArray
+    wrapped: FloatArray
+    height: FloatArray
+    truth: FloatArray
+    residual: FloatArray
+    smooth: Array
+    ledger: Ledger
+
+    @property
+    def interferogram(self) -> FloatArray:
+        """(rows, columns) float64, |E|^2."""
+        return np.asarray(self.frames[0])
+
+    @property
+    def full_scale(self) -> float:
+        """|E|^2 of 65535 counts in the 16-bit files: 1, or that of the brightest pixel if it is above 1."""
+        return max(1.0, float(self.frames.max()))
+
+    @property
+    def fringes(self) -> float:
+        """Fringes across the image that the tilt alone makes, along its steeper axis."""
+        rows, columns = self.truth.shape
+        slope_x, slope_y = path_slope(self.tilt)
+        return float(max(abs(slope_x) * columns, abs(slope_y) * rows) * self.pitch / self.wavelength)
+
+    def rms(self, where: Array | None = None) -> float:
+        """Root mean square of the residual.
+
+        Parameters
+        ----------
+        where : (rows, columns) bool, optional
+            Default: wherever there is a residual.
+
+        Returns
+        -------
+        float, metres
+            NaN if there are none.
+        """
+        chosen = np.isfinite(self.residual) if where is None else where & np.isfinite(self.residual)
+        return float(np.sqrt(np.mean(self.residual[chosen] ** 2))) if chosen.any() else math.nan
+
+
+def heights(
+    mesh: Mesh, shape: tuple[int, int], pitch: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0)
+) -> FloatArray:
+    """Heights of a mesh at the centres of pixels.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    shape : (rows, columns)
+    pitch : float, metres
+    centre : (3,) array-like, metres
+        The point that is in the middle of the image, and at height 0.
+
+    Returns
+    -------
+    (rows, columns) float64, metres
+        NaN where there is no mesh.
+    """
+    x, y = pixel_centres(shape, pitch)
+    x0, y0, z0 = np.asarray(centre, dtype=np.float64)
+    return np.asarray(interpolate_height(mesh, x[None, :] + x0, y[:, None] + y0) - z0)
+
+
+def _smooth(truth: FloatArray, limit: float, bend: float) -> Array:
+    """Where heights change by less than `limit` to all neighbours and evenly; steps and rims are left out."""
+    padded = np.pad(truth, 1, mode="edge")
+    middle = padded[1:-1, 1:-1]
+    pairs = ((padded[:-2, 1:-1], padded[2:, 1:-1]), (padded[1:-1, :-2], padded[1:-1, 2:]))
+    with np.errstate(invalid="ignore"):
+        small = [np.abs(side - middle) < limit for pair in pairs for side in pair]
+        even = [np.abs(one + other - 2.0 * middle) < bend for one, other in pairs]
+    return np.asarray(np.all([*small, *even], axis=0))
+
+
+def _piston(differences: FloatArray, wavelength: float) -> float:
+    """Mean of differences of height, leaving out those that are off by half a wavelength or more."""
+    if not differences.size:
+        return 0.0
+    middle = float(np.median(differences))
+    about = differences - middle
+    return middle + float(about[np.abs(about) <= 0.25 * wavelength].mean())
+
+
+def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) -> Measurement:
+    """Record phase-stepped frames on a bench, find the height, and compare it with the truth.
+
+    Parameters
+    ----------
+    bench : Bench
+    truth : (rows, columns) float64, metres
+        Heights at the pixels, see `heights`.
+    wavelength : float, metres
+    steps : int, at least 3
+
+    Returns
+    -------
+    Measurement
+    """
+    # a pixel that is averaged shows a mean of both sides of a step
+    averaged = chosen(bench.trace(wavelength), bench.method) == "wavefront"
+    bend = STEP * wavelength if averaged else math.inf
+    height = bench.height(wavelength, steps)
+    both = np.isfinite(height) & np.isfinite(truth)
+    residual = np.where(both, height - truth, np.nan)
+    return Measurement(
+        wavelength=wavelength,
+        pitch=bench.ccd.pitch,
+        tilt=bench.tilt,
+        frames=bench.phase_steps(wavelength, steps),
+        wrapped=bench.wrapped(wavelength, steps),
+        height=height,
+        truth=truth,
+        residual=residual - _piston(residual[both], wavelength),
+        smooth=_smooth(truth, 0.25 * wavelength, bend),
+        ledger=bench.trace(wavelength).ledger(),
+    )
+
+
+def dataset(measurement: Measurement) -> Dataset:
+    """Everything, labelled.
+
+    Parameters
+    ----------
+    measurement : Measurement
+
+    Returns
+    -------
+    xarray.Dataset
+        Coordinates x, y (metres) and step (radians); units in the attributes of each variable.
+    """
+    m = measurement
+    images = {
+        "interferogram": m.interferogram,
+        "frames": (("step",), m.frames),
+        "wrapped_phase": m.wrapped,
+        "height": m.height,
+        "mesh_height": m.truth,
+        "residual": m.residual,
+    }
+    attributes = {
+        "title": "Michelson interferogram",
+        "wavelength_m": m.wavelength,
+        "reference_tilt_rad": list(m.tilt),
+        "residual_rms_m": m.rms(),
+        "residual_rms_away_from_steps_m": m.rms(m.smooth),
+        **{f"power_{name}": value for name, value in vars(m.ledger).items()},
+        **{f"version_{name}": version(name) for name in LIBRARIES},
+    }
+    return records.dataset(images, m.pitch, stepped(len(m.frames)), **attributes)
+
+
+def write_netcdf(measurement: Measurement, path: Path) -> None:
+    """`dataset` as a NetCDF file.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    path : Path
+    """
+    tables.write_netcdf(dataset(measurement), path)
+
+
+def write_camera(measurement: Measurement, folder: Path) -> None:
+    """interferogram.tif and frames.tif: 16-bit, with the full scale in their description.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    folder : Path
+    """
+    m = measurement
+    for name, images in (("interferogram", m.interferogram), ("frames", m.frames)):
+        path = folder / f"{name}.tif"
+        tiff.save(images, m.pitch, path, full_scale=m.full_scale, wavelength_m=m.wavelength)
+
+
+def write_heights(measurement: Measurement, folder: Path, kinds: Iterable[str]) -> None:
+    """height.dat or height.datx: the measured height as a file of Zygo's.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    folder : Path
+    kinds : iterable of {"dat", "datx"}
+    """
+    m = measurement
+    for kind in kinds:
+        write_height_map(m.height, m.pitch, folder / f"height.{kind}", wavelength=m.wavelength)
+
+
+def write_pictures(measurement: Measurement, folder: Path) -> None:
+    """interferogram.png, and height.png with the residual beside the height.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    folder : Path
+    """
+    from fringetrace import views
+
+    m = measurement
+    image = views.interferogram(m.interferogram, m.pitch, wavelength=m.wavelength, title="Interferogram")
+    views.save(image, folder / "interferogram.png")
+    left, right = views.pair()
+    views.height(m.height, m.pitch, left, title="Height, measured")
+    views.residual(m.residual, m.pitch, right, wavelength=m.wavelength, title="Measured − mesh")
+    views.save(left, folder / "height.png")

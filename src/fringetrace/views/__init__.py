@@ -1,0 +1,5 @@
+"""Plots of arrays, and three-dimensional views of scenes."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,1 @@
+from . import colour_plots as colour_plots

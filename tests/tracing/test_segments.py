@@ -1,0 +1,143 @@
+"""What recorded paths met: how far off their hits are, how surfaces bend there, what an error does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import fringetrace as ft
+from fringetrace import mm, nm
+from fringetrace.core.vectors import rotation, unit
+from fringetrace.geometry import forms, shapes
+from fringetrace.tracing import segments
+
+EPS = float(np.finfo(np.float64).eps)
+
+
+def ball(form, radius=0.1, centre=(0.3, -0.2, 0.5), level=3):
+    mesh = shapes.icosphere(radius, level).moved(centre)
+    scene = ft.Scene([ft.Surface(mesh, ft.Mirror(), "ball", form=form)])
+    beam = ft.Beam(np.add(centre, (0, 0, 0.5)), (0, 0, -1), (0, 1, 0), (0.06, 0.06), (20, 21))
+    ccd = ft.CCD(np.add(centre, (0, 0, 0.4)), (0, 0, -1), (0, 1, 0), 0.01, (200, 200))
+    return ft.trace(scene, beam, ccd, record=True).detected
+
+
+SPHERE = forms.Sphere((0.3, -0.2, 0.5), 0.1)
+
+
+def test_paths_have_to_be_recorded():
+    paths = ball(None)
+    with pytest.raises(ValueError, match="contacts: expected paths traced with record=True"):
+        list(segments.met(replace(paths, points=None)))
+
+
+def test_segments_are_those_of_the_path():
+    paths = ball(SPHERE)
+    length, direction = segments.legs(paths)
+    assert length.shape == (len(paths), 2)
+    np.testing.assert_allclose(length.sum(axis=1).astype(float), paths.length, rtol=4 * EPS)
+    np.testing.assert_allclose(direction[:, 1].astype(float), paths.direction, rtol=0, atol=8 * EPS)
+    np.testing.assert_allclose(
+        direction[:, 0].astype(float), np.tile([0, 0, -1.0], (len(paths), 1)), atol=1e-14
+    )
+
+
+def test_the_plane_in_focus_may_lie_behind_the_last_surface():
+    paths = ball(SPHERE)
+    behind = ft.trace(paths.scene, paths.source, replace(paths.ccd, focus=0.35), record=True).detected
+    length, _ = segments.legs(behind)
+    assert (length[:, 1] < 0.0).all()
+    np.testing.assert_allclose(length.sum(axis=1).astype(float), behind.length, rtol=4 * EPS)
+
+
+def test_hits_are_off_their_facets_by_roundings():
+    for form in (None, SPHERE):
+        (met,) = segments.met(ball(form))
+        assert met.formed.all() == (form is not None)
+        offset = np.linalg.norm(segments.off(met).astype(float), axis=1)
+        assert 0.0 < offset.max() < 4 * EPS
+
+
+def test_a_hit_that_is_off_is_seen():
+    paths = ball(None)
+    (met,) = segments.met(paths)
+    normal = segments.normals(met)
+    lifted = replace(met, point=met.point + 5 * nm * normal)
+    np.testing.assert_allclose(segments.off(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS)
+
+
+def test_a_mirror_moved_along_its_normal_changes_the_path_by_twice_the_cosine():
+    paths = ball(SPHERE)
+    (met,) = segments.met(paths)
+    normal = segments.normals(met)
+    _, direction = segments.legs(paths)
+    change = segments.shifted(paths, met, 1 * nm * normal, direction)
+    cosine = np.abs(normal[:, 2])
+    # a hit in front of the mirror has a path that is too short
+    np.testing.assert_allclose(change.astype(float), -2 * nm * cosine, rtol=1e-12)
+
+
+FORMS = {
+    "sphere": (SPHERE, 1.0, 1.0),
+    "cylinder": (forms.Cylinder((0.3, 0.0, 0.5), (0, 1, 0), 0.1), 1.0, 0.0),
+    "ellipsoid": (forms.Conic((0.3, -0.2, 0.4), (0, 0, 1), 0.1, 0.0), 1.0, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", FORMS)
+def test_curvature_is_that_of_the_form(name):
+    form, across, along = FORMS[name]
+    if name == "cylinder":
+        mesh = shapes.rod_lattice(1, 1, 0.1, 0.3, 0.4, sides=90).moved((0.3, -0.2, 0.5))
+    else:
+        mesh = shapes.icosphere(0.1, 3).moved((0.3, -0.2, 0.5))
+    scene = ft.Scene([ft.Surface(mesh, ft.Mirror(), form=form)])
+    rays = ft.Rays([(0.3, -0.2, 1.0), (0.32, -0.21, 1.0)], [(0, 0, -1.0)] * 2)
+    paths = ft.trace(scene, rays, max_bounces=1, record=True)
+    (met,) = segments.met(paths)
+    bend, normal = segments.curvature(met), segments.normals(met)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", bend, normal), 0.0, atol=1e-9)
+    if name == "ellipsoid":
+        normal = -normal  # heights grow inwards
+        bend = -bend
+    np.testing.assert_allclose(bend[0] * 0.1, np.diag([across, along, 0.0]), atol=1e-9)
+    # n(p + dp) = n + C dp
+    moved = replace(met, point=met.point + 1e-6 * unit(np.cross(normal, (0, 1.0, 0.2))))
+    turned = (
+        segments.normals(moved) * np.sign((segments.normals(moved) * normal).sum(1))[:, None] - normal
+    ) / 1e-6
+    step = unit(np.cross(normal, (0, 1.0, 0.2)))
+    np.testing.assert_allclose(turned, np.einsum("nij,nj->ni", bend, step), atol=1e-3)
+
+
+def test_patches_bend_like_the_ball_they_were_made_for():
+    for form, near in ((forms.Smooth(), 0.1), (None, None)):
+        (met,) = segments.met(ball(form, level=4))
+        bend = segments.curvature(met) * 0.1
+        values = np.sort(np.linalg.eigvalsh(bend), axis=1)
+        if form is None:
+            assert (bend == 0.0).all()
+        else:
+            np.testing.assert_allclose(np.abs(values), np.tile([0.0, 1.0, 1.0], (len(bend), 1)), atol=near)
+
+
+def test_facets_leave_out_what_a_form_gives():
+    (plain,) = segments.met(ball(None))
+    height, lean = segments.flattened(plain)
+    assert np.linalg.norm(height, axis=1).max() == pytest.approx(0.1 * 4.528e-3, rel=0.1)
+    assert np.linalg.norm(lean, axis=1).max() > 0.05
+    (formed,) = segments.met(ball(SPHERE))
+    assert not np.any(segments.flattened(formed))
+
+
+@pytest.mark.parametrize("longer", [0.0, 3 * nm])
+def test_rounding_is_what_the_path_lacks(longer):
+    """A path made longer by 3 nm is off by 3 nm, for beams and for rays that bring a path along."""
+    turn = rotation((1, 2, 3), 0.7)
+    scene = ft.Scene([ft.Surface(shapes.plate(1.0, 1.0).moved(turn=turn), ft.Mirror())])
+    rays = ft.Rays([(0.1, 0.0, 1.0), (0.0, 0.1, 1.0)], [(0, 0, -1.0)] * 2, length=[0.5, 0.25])
+    beam = ft.Beam((0, 0, 1), (0, 0, -1), (0, 1, 0), (1 * mm, 1 * mm), (3, 3))
+    for source in (rays, beam):
+        paths = ft.trace(scene, source, record=True)
+        error = segments.rounding(replace(paths, length=paths.length + longer))
+        np.testing.assert_allclose(error, longer, rtol=0, atol=16 * EPS)
