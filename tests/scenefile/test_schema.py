@@ -10,7 +10,7 @@ from fringetrace.geometry.mesh import Mesh
 from fringetrace.instruments.interferometer import Bench
 from fringetrace.optics import films, interfaces, polarisers
 from fringetrace.optics.materials.material import Material
-from fringetrace.scene import model, sources
+from fringetrace.scene import model, sensor, sources
 from fringetrace.scenefile.schema import Recipe, call, concrete, kinds, members, parameters
 
 HINTS = {name: parameter.hint for name, parameter in parameters(model.Surface).items()}
@@ -63,7 +63,7 @@ def test_kinds_are_those_that_a_parameter_takes():
 def test_alternatives_are_listed_without_none():
     assert members(int | None) == (int,)
     assert members(int | float | None) == (int, float)
-    assert concrete(members(model.CCD | None)) == [model.CCD]
+    assert concrete(members(sensor.CCD | None)) == [model.CCD]
 
 
 def test_all_further_arguments_are_a_list():
