@@ -416,7 +416,7 @@ def extruded(side: int) -> Skip:
 
 def observed(side: int) -> Skip:
     """The rays of one incidence serve all directions that are observed."""
-    lattice = ft.scattering.Lattice(10, 4)
+    lattice = ft.scattering.RodLattice(10, 4)
     theta = np.radians(np.arange(-60, 61, 20))
     waves = np.linspace(400, 700, 16) * nm
     given = {"rays": (1, 16 * side), "threads": 1}

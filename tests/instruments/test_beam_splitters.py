@@ -8,6 +8,7 @@ import pytest
 from fringetrace import instruments, nm
 from fringetrace.core.units import degree
 from fringetrace.core.vectors import unit
+from fringetrace.geometry import shapes
 from fringetrace.instruments.beam_splitters import SplitterPlate, anti_reflecting, semi_reflecting
 from fringetrace.optics import films
 from fringetrace.optics.interfaces import Absorber

@@ -63,7 +63,7 @@ def test_kinds_are_those_that_a_parameter_takes():
 def test_alternatives_are_listed_without_none():
     assert members(int | None) == (int,)
     assert members(int | float | None) == (int, float)
-    assert concrete(members(sensor.CCD | None)) == [model.CCD]
+    assert concrete(members(sensor.CCD | None)) == [sensor.CCD]
 
 
 def test_all_further_arguments_are_a_list():

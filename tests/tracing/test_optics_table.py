@@ -13,7 +13,7 @@ from fringetrace.geometry import forms, shapes
 from fringetrace.optics import materials, polarisers
 from fringetrace.optics.films import Film
 from fringetrace.tracing import optics_table
-from fringetrace.tracing.optics_table import materials as media_of, needs, optics, plain
+from fringetrace.tracing.optics_table import needs, optics, plain, scene_media as media_of
 from fringetrace.tracing.rewavelength import at_wavelength
 
 PLATE = shapes.plate(1, 1)

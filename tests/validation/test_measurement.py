@@ -22,7 +22,7 @@ def measured(mesh, **options):
         mesh, **{"aperture": 6 * mm, "pixels": (30, 40), "reference_tilt": (2e-4, 1e-4), **options}
     )
     truth = measurement.heights(mesh, bench.ccd.shape, bench.ccd.pitch)
-    return measurement.measure(bench, truth, HENE)
+    return measurement.measure_height(bench, truth, HENE)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def test_heights_are_those_of_the_mesh_about_a_point():
 
 
 def test_the_netcdf_holds_everything_with_units(bumpy, tmp_path):
-    measurement.write_netcdf(bumpy, tmp_path / "result.nc")
+    measurement.write_measurement(bumpy, tmp_path / "result.nc")
     with xarray.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as data:
         for name, array in (
             ("interferogram", bumpy.interferogram), ("frames", bumpy.frames),
