@@ -1,5 +1,7 @@
 """Wrapped phase to height: unwrapping, two wavelengths, planes taken off. Phase stepping is here too.
 
+What a numpy.ma array masks is unknown, and comes out as NaN.
+
 References
 ----------
 - Cheng 1984: Y.-Y. Cheng, J. C. Wyant, Applied Optics 23, 4539.
@@ -13,7 +15,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_wavelength
+from fringetrace.core import FloatArray, checked_wavelength, filled
 from fringetrace.phase.stepping import (
     carre,
     four_step,
@@ -58,7 +60,7 @@ def wrap(phase: npt.ArrayLike) -> FloatArray:
     float64, radians in (-pi, pi], shape of `phase`
     """
     turn = 2.0 * math.pi
-    folded = np.fmod(np.asarray(phase, dtype=np.float64), turn)
+    folded = np.fmod(filled(phase), turn)
     folded = np.where(folded > math.pi, folded - turn, folded)
     return np.where(folded <= -math.pi, folded + turn, folded)
 
@@ -67,11 +69,11 @@ def _checked_map(
     values: npt.ArrayLike, mask: npt.ArrayLike | None, what: str
 ) -> tuple[FloatArray, BoolArray]:
     """A map, and which of its pixels count."""
-    pixels = np.asarray(values, dtype=np.float64)
+    pixels = filled(values)
     if pixels.ndim != 2:
         raise ValueError(f"{what}: expected a map of shape (rows, columns), got shape {pixels.shape}")
     valid = np.isfinite(pixels)
-    if mask is not None:
+    if mask is not None and mask is not np.ma.nomask:
         left_out = np.asarray(mask, dtype=np.bool_)
         if left_out.shape != pixels.shape:
             raise ValueError(f"{what} mask: expected shape {pixels.shape}, got {left_out.shape}")
@@ -152,7 +154,7 @@ def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
         If the wavelength is not a positive length.
     """
     scale = checked_wavelength(wavelength) / (4.0 * math.pi)
-    return np.asarray(np.asarray(phase, dtype=np.float64) * scale, dtype=np.float64)
+    return np.asarray(filled(phase) * scale, dtype=np.float64)
 
 
 def synthetic_wavelength(wavelength1: float, wavelength2: float) -> float:
@@ -199,7 +201,7 @@ def two_wavelength(
         erfc(pi / (sqrt(2) sigma q)), q**2 = (L / l - 1)**2 + (L / l)**2, l the shorter wavelength.
     """
     beat = synthetic_wavelength(wavelength1, wavelength2)
-    fine, other = np.asarray(phase1, dtype=np.float64), np.asarray(phase2, dtype=np.float64)
+    fine, other = filled(phase1), filled(phase2)
     shorter = float(wavelength1)
     if wavelength1 > wavelength2:
         fine, other, shorter = other, fine, float(wavelength2)

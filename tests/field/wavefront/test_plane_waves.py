@@ -34,7 +34,7 @@ def flux(paths):
 
 def test_triangles_of_one_plane_have_one_number():
     mesh = shapes.staircase(3 * mm, 2 * mm, 3, 70 * nm).moved((1e-3, 0, 2e-3), rotation((1, 2, 3), 0.7))
-    (planes,) = facet_groups.parted(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
+    (planes,) = facet_groups.group_facets(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
     assert (planes[::2] == planes[1::2]).all()
     assert len(np.unique(planes)) == 5
 
