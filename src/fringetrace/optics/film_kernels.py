@@ -1,4 +1,4 @@
-"""Compiled loops of bare faces, and of thin films by their characteristic matrices: amplitudes."""
+"""Compiled Fresnel coefficients of bare interfaces, and characteristic matrices of thin films."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ASLANT = 1e-9
 
 @jit
 def normal(index, sine2):
-    """Normal part kz / k0 = sqrt(n^2 - sine2) of the wave that goes on: Im > 0, or Re > 0 where it is real.
+    """Normal component kz / k0 = sqrt(n^2 - sine2) of the transmitted wave: Im > 0, or Re > 0 if real.
 
     Waves that come out of an absorbing medium may grow along z, as they are damped along x: there
     the branch with Re + Im > 0 is the one that goes on into that of a transparent medium.
@@ -25,7 +25,7 @@ def normal(index, sine2):
 
 @jit
 def across(index, sine2, thickness, k0):
-    """Matrix of a layer, times p = exp(i k0 kz d): its diagonal, i sin / kz, i kz sin, and p.
+    """Characteristic matrix of a layer, times p = exp(i k0 kz d): diagonal, i sin / kz, i kz sin, and p.
 
     In terms of p, which cannot overflow, and of a quotient that stays finite at kz = 0.
     """
@@ -45,7 +45,7 @@ def across(index, sine2, thickness, k0):
 
 @jit
 def stack(sine2, first, layers, thickness, last, k0):
-    """Amplitudes (rs, rp, ts, tp) of a stack of layers between two half spaces.
+    """Amplitudes (rs, rp, ts, tp) of a thin-film stack between two half-spaces.
 
     sine2 = (n sin(theta))^2 of the first half space, the same all through the stack; `first`,
     `last` and `layers` (m,) are complex indices, in the order that light meets them; `thickness`
@@ -79,7 +79,7 @@ def stack(sine2, first, layers, thickness, last, k0):
 
 @jit
 def carried(sine2, first, last):
-    """Power across a face or film for |t|^2 = 1, of s and of p light: T = carried * |t|^2.
+    """Power transmittance for |t|^2 = 1, of s and p light: T = carried * |t|^2.
 
     The normal part of the Poynting vector behind, by that before; T = 0 where light is totally
     reflected. If the first half space absorbs, R + T is not the whole (Byrnes, section 3).
@@ -113,26 +113,26 @@ def shares(sine2, first, last):
 
 @part
 def forward(squared):
-    """Normal part of a wave vector from its square: the root that runs, or fades, forwards."""
+    """Normal wave-vector component from its square: the root that propagates or decays forwards."""
     root = np.sqrt(squared)
     return -root if root.real + root.imag < 0.0 else root
 
 
 @part
 def flow(index, normal):
-    """Power through a boundary of s and of p light of unit amplitude: n cos, but in an absorbing medium."""
+    """Power flux through an interface for unit amplitude, s and p: n cos, except in absorbing media."""
     return normal.real, (index * (normal / index).conjugate()).real
 
 
 @part
 def shared(through, before):
-    """From amplitudes of E to those of power; nothing goes on where no power flows."""
+    """Amplitudes of power from amplitudes of E; nothing is transmitted where no power flows."""
     return np.sqrt(through / before) if through > 0.0 and before > 0.0 else 0.0
 
 
 @part
 def fresnel(first, q1, last, q2):
-    """Fresnel's r_s, r_p, t_s, t_p, of E, from indices and normal parts n cos; signs as in `films`."""
+    """Fresnel coefficients r_s, r_p, t_s, t_p of E, from n and n cos of both sides; signs as in `films`."""
     a, b = last * last * q1, first * first * q2
     s, p = 1.0 / (q1 + q2), 1.0 / (a + b)
     return (q1 - q2) * s, (a - b) * p, 2.0 * q1 * s, 2.0 * first * last * q1 * p

@@ -1,4 +1,4 @@
-"""Cylindrical harmonics H_n(k r) exp(i n phi): one cylinder's answer, and what a row sends to itself."""
+"""Cylindrical waves H_n(k r) exp(i n phi): scattering by one cylinder, and lattice sums of a row."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _OVERFLOW = 600.0  # exponent beyond which the integrand is nothing
 
 
 def truncation(size_parameter: float) -> int:
-    """Highest order N that a cylinder of size parameter k a needs.
+    """Truncation order N of the cylindrical waves for a size parameter k a.
 
     W. J. Wiscombe's rule (Appl. Opt. 19, 1505 (1980)), with its constants raised until the first order left
     out is 1e-13 of the largest, for k a = 0.01 to 1000. Cylinders that almost touch may need more.
@@ -32,13 +32,13 @@ def truncation(size_parameter: float) -> int:
 
 
 def at_wavelength(index: Index, wavelength: FloatArray) -> ComplexArray:
-    """Refractive index at each of some wavelengths in metres, complex128 of their shape."""
+    """Refractive index at wavelengths in metres, complex128 of their shape."""
     value = index(wavelength) if callable(index) else index
     return np.broadcast_to(np.asarray(value, np.complex128), wavelength.shape)
 
 
 def check_polarisation(polarisation: str) -> None:
-    """Raise ValueError unless the polarisation is "E" or "H"."""
+    """Check that the polarisation is "E" or "H"; else ValueError."""
     if polarisation not in ("E", "H"):
         raise ValueError(f"Polarisation: expected 'E' or 'H', got {polarisation!r}")
 
@@ -47,7 +47,7 @@ def boundary(
     radius: ArrayLike, index: ArrayLike, host: ArrayLike, wavelength: ArrayLike, polarisation: Polarisation,
     orders: int,
 ) -> tuple[Array, FloatArray, Array]:  # fmt: skip
-    """What the boundary of a cylinder does to each harmonic (Bohren and Huffman, 8.30 to 8.37).
+    """Boundary conditions of a cylinder for each order (Bohren and Huffman, 8.30 to 8.37).
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def _with_derivative(cylinder_function: ComplexArray) -> tuple[ComplexArray, Com
 
 
 def hankel(argument: FloatArray, orders: int) -> ComplexArray:
-    """H_n^(1) of orders -N to N, (..., 2 N + 1), by upward recurrence, along which it never shrinks."""
+    """Hankel functions H_n^(1) of orders -N to N, (..., 2 N + 1), by upward recurrence."""
     from scipy.special import hankel1
 
     rising = [hankel1(0, argument), hankel1(1, argument)]
@@ -120,7 +120,7 @@ def hankel(argument: FloatArray, orders: int) -> ComplexArray:
 
 
 def waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
-    """H_l(k R) exp(i l phi) of orders -N to N at displacements (..., 2), zero at displacement zero."""
+    """Cylindrical waves H_l(k R) exp(i l phi), orders -N to N, at displacements (..., 2); 0 at R = 0."""
     distance = np.hypot(displacement[..., 0], displacement[..., 1])
     here = distance == 0.0
     azimuth = np.arctan2(displacement[..., 1], displacement[..., 0])
@@ -131,7 +131,7 @@ def waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
 
 
 def lattice_sums(beta: ArrayLike, k: ArrayLike, pitch: float, orders: int) -> ComplexArray:
-    """Lattice sums of a row: the waves H_l(k R) exp(i l phi) at one cylinder from all the others in the row.
+    """Lattice sums of a row: cylindrical waves at one cylinder from all the others in the row.
 
     The cylinder at j d sends with the phase exp(i beta j d), and R, phi lead from it to the cylinder at 0.
 
