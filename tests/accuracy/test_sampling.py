@@ -62,7 +62,7 @@ def test_rays_stand_for_parts_of_a_pixel():
     angle, pixels = 3e-3, 16
     for rays in (16, 32, 48):
         paths = plane(rays, pixels, angle).detected
-        field = ft.complex_field(sampling.spread(paths, HENE), HENE, "rays")
+        field = ft.complex_field(sampling.spread_over_pixels(paths, HENE), HENE, "rays")
         cycles = math.sin(2 * angle) / 16 * mm / HENE
         # rays that lean leave the CCD at one rim
         inner = np.abs(field[:, 2:-2])
@@ -72,7 +72,7 @@ def test_rays_stand_for_parts_of_a_pixel():
 @pytest.mark.parametrize("rows", [1, 12, 13, 100])
 def test_bands_lie_in_the_image(rows):
     ccd = ft.CCD((1, 2, 3), (1, 0, 0), (0, 0, 1), 1.0, (rows, 5), focus=2.0)
-    bands = sampling.bands(ccd)
+    bands = sampling.sample_bands(ccd)
     assert len(bands) == (1 if rows <= 12 else 3)
     _, v, _ = ccd.axes
     for band in bands:
@@ -88,7 +88,7 @@ def test_fields_on_bands_are_those_of_the_image():
     paths = plane(16, 20, 0.3e-3)
     image = ft.complex_field(paths, HENE, "wavefront")
     tops = [round(part * 20 - 2) for part in sampling.BANDS]
-    for top, ccd in zip(tops, sampling.bands(paths.ccd), strict=True):
+    for top, ccd in zip(tops, sampling.sample_bands(paths.ccd), strict=True):
         field = ft.complex_field(replace(paths, ccd=ccd), HENE, "wavefront")
         np.testing.assert_allclose(field, image[top : top + 4], rtol=0, atol=1e-9)
 

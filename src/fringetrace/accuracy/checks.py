@@ -51,13 +51,13 @@ def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
 
     seen = paths.detected
     if len(seen) == 0:
-        text = contradicted(paths)
+        text = media_contradiction(paths)
         return [] if text is None else [text]
-    texts = [contradicted(paths), aliased(seen, wavelength)]
+    texts = [media_contradiction(paths), aliasing(seen, wavelength)]
     if chosen(paths, method) == "rays":
-        texts += [starved(seen), folded(seen)]
+        texts += [starvation(seen), folding(seen)]
     else:
-        texts.append(focused(seen, wavelength))
+        texts.append(focusing(seen, wavelength))
     return [text for text in texts if text is not None]
 
 
@@ -89,7 +89,7 @@ def check_budget(budget: Budget) -> None:
         warnings.warn(text, FringetraceWarning, stacklevel=3)
 
 
-def judged(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
+def judge(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
     """Error budget of an image, and all warnings.
 
     Parameters
@@ -108,7 +108,7 @@ def judged(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budge
     return costs, [*found(paths, wavelength, method), *filter(None, [costly(costs)])]
 
 
-def contradicted(paths: Paths) -> str | None:
+def media_contradiction(paths: Paths) -> str | None:
     """Contradicting media: rays reach a boundary in another medium than it has on that side.
 
     Parameters
@@ -131,7 +131,7 @@ def contradicted(paths: Paths) -> str | None:
     )
 
 
-def aliased(paths: Paths, wavelength: float) -> str | None:
+def aliasing(paths: Paths, wavelength: float) -> str | None:
     """Aliased fringes: the phase between two waves changes by more than pi per pixel.
 
     Slopes are means over the rays of one path key, in parts of the image that are as small as the
@@ -180,7 +180,7 @@ def aliased(paths: Paths, wavelength: float) -> str | None:
     )
 
 
-def starved(paths: Paths) -> str | None:
+def starvation(paths: Paths) -> str | None:
     """Starved pixels: no ray, though pixels on both sides have some.
 
     Parameters
@@ -216,7 +216,7 @@ def starved(paths: Paths) -> str | None:
     )
 
 
-def folded(paths: Paths) -> str | None:
+def folding(paths: Paths) -> str | None:
     """Folded wavefronts on the CCD: neighbouring rays arrive in reversed order.
 
     Where facets fold the light only cells across their edges are turned over, one cell wide: that is none.
@@ -251,7 +251,7 @@ def folded(paths: Paths) -> str | None:
     )
 
 
-def focused(paths: Paths, wavelength: float) -> str | None:
+def focusing(paths: Paths, wavelength: float) -> str | None:
     """Foci and cusps on the CCD, where the irradiance of rays is infinite.
 
     A fold alone is none: the wavefront method knows its uniform form. Looked for in waves off forms.

@@ -33,7 +33,7 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
     return math.sqrt(off / all_) / (2.0 * math.pi) if all_ > 0.0 else 0.0
 
 
-def bands(ccd: CCD, height: int = ROWS) -> list[CCD]:
+def sample_bands(ccd: CCD, height: int = ROWS) -> list[CCD]:
     """Bands of a CCD that represent all of it: rows near its lower end, its middle, its upper end.
 
     Parameters
@@ -88,7 +88,7 @@ def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0
     float, waves; see `budget.Budget`
     """
     assert grids[0].ccd is not None
-    parts = bands(grids[0].ccd)
+    parts = sample_bands(grids[0].ccd)
     fields = [
         [complex_field(replace(paths, ccd=ccd), wavelength, "wavefront") for ccd in parts] for paths in grids
     ]
@@ -116,7 +116,7 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
     finer: list[ComplexArray] = []
     groups = np.zeros(len(paths), dtype=np.int64)
     axes = (None,) if paths.field is None else paths.ccd.axes
-    for ccd in bands(paths.ccd):
+    for ccd in sample_bands(paths.ccd):
         for axis in axes:
             light = [assemble.light(replace(paths, ccd=ccd), groups, axis=axis)]
             for images, more in ((fields, 0), (finer, MORE)):
@@ -124,7 +124,7 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
     return _difference(fields, finer)
 
 
-def spread(paths: Paths, wavelength: float) -> Paths:
+def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
     """Rays averaged as plane waves over their part of a pixel.
 
     Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
@@ -162,8 +162,8 @@ def offset_error(paths: Paths, wavelength: float) -> float:
     """
     assert paths.ccd is not None
     seen = paths.detected
-    parts = [_onto(seen, ccd) for ccd in bands(paths.ccd, MANY)]
-    means = [complex_field(spread(part, wavelength), wavelength, "rays") for part in parts]
+    parts = [_onto(seen, ccd) for ccd in sample_bands(paths.ccd, MANY)]
+    means = [complex_field(spread_over_pixels(part, wavelength), wavelength, "rays") for part in parts]
     return _difference(means, [complex_field(part, wavelength, "rays") for part in parts])
 
 
@@ -186,7 +186,7 @@ def count_error(paths: Paths, wavelength: float) -> float:
     assert paths.ccd is not None
     assert isinstance(paths.source, Beam)
     seen, fields, others = paths.detected, [], []
-    for ccd in bands(paths.ccd, MANY):
+    for ccd in sample_bands(paths.ccd, MANY):
         rows, columns = (n - n % 2 for n in ccd.shape)
         if rows == 0 or columns == 0:
             return 0.0
@@ -195,8 +195,8 @@ def count_error(paths: Paths, wavelength: float) -> float:
         few = all_.where(_even(row) & _even(column))
         assert few.area is not None
         few = replace(few, area=4.0 * few.area)
-        fields.append(complex_field(spread(all_, wavelength), wavelength, "rays"))
-        others.append(complex_field(spread(few, wavelength), wavelength, "rays"))
+        fields.append(complex_field(spread_over_pixels(all_, wavelength), wavelength, "rays"))
+        others.append(complex_field(spread_over_pixels(few, wavelength), wavelength, "rays"))
     return _difference(fields, others)
 
 

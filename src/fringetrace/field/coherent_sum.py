@@ -31,14 +31,14 @@ def method_for(paths: Paths) -> str:
     -------
     {"wavefront", "rays"}
     """
-    from fringetrace.scene import parted
+    from fringetrace.scene import group_facets
 
     if not isinstance(paths.source, Beam) or paths.ccd is None or torn(paths):
         return "rays"
     most = max(FEW, int(np.prod(paths.source.shape)) // SHARING)
     flat = [surface for surface in paths.scene.surfaces if surface.form is None]
     if sum(len(surface.mesh.faces) for surface in flat) > most:
-        parts = parted(paths.scene)
+        parts = group_facets(paths.scene)
         facets = [parts[i].max() + 1 for i, s in enumerate(paths.scene.surfaces) if s.form is None]
         if sum(facets) > most:
             return "rays"

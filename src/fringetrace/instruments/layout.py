@@ -24,7 +24,9 @@ STEEP = STEEPEST / math.hypot(1.0, STEEPEST)
 Sample = Mesh | Surface | Iterable[Surface]
 
 
-def checked_image(bench: str, aperture: float, pixels: tuple[int, int], rays: float) -> tuple[float, float]:
+def checked_image_size(
+    bench: str, aperture: float, pixels: tuple[int, int], rays: float
+) -> tuple[float, float]:
     """Checked width and height of an image, metres.
 
     Parameters
@@ -65,7 +67,7 @@ def ray_grid(pixels: tuple[int, int], rays: float) -> tuple[int, int]:
     return max(least, round(pixels[0] * rays)), max(least, round(pixels[1] * rays))
 
 
-def seen(profile: Profile | None) -> Profile | None:
+def flip_profile(profile: Profile | None) -> Profile | None:
     """Profile over the image as one over a beam whose columns run along -x."""
     return None if profile is None else partial(_mirrored, profile)
 
@@ -74,28 +76,28 @@ def _mirrored(profile: Profile, x: FloatArray, y: FloatArray) -> FloatArray:
     return profile(-x, y)
 
 
-def standing(normal: FloatArray) -> FloatArray:
+def standing_rotation(normal: FloatArray) -> FloatArray:
     """Rotation (3, 3) of a plate from +z to a normal in any direction but y, its rows still along y."""
     n = unit(np.asarray(normal, dtype=np.float64)[None])[0]
     side = unit(np.cross([0.0, 1.0, 0.0], n)[None])[0]
     return np.stack([side, np.cross(n, side), n], axis=1)
 
 
-def leaning(tilt: tuple[float, float]) -> FloatArray:
+def tilted_normal(tilt: tuple[float, float]) -> FloatArray:
     """Normal of a tilted mirror that faced +z; `path_slope` of its light is along the tilt."""
     angle = math.hypot(*tilt)
     scale = math.sin(angle) / angle if angle > 0.0 else 1.0
     return np.array([scale * tilt[0], scale * tilt[1], math.cos(angle)])
 
 
-def surrounding(medium: Material | complex | str | None) -> Material | None:
+def surrounding_medium(medium: Material | complex | str | None) -> Material | None:
     """Medium around an interferometer, from a material, name or index; None: vacuum."""
     from fringetrace.optics import as_material
 
     return None if medium is None else as_material(medium, "medium")
 
 
-def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...]:
+def transmitting_surfaces(bench: str, sample: Sample, index: object) -> tuple[Surface, ...]:
     """Surfaces of a transparent sample.
 
     Parameters
@@ -131,7 +133,7 @@ def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...
     return (Surface(mesh, Dielectric("transmitted"), "sample", back=index),)  # type: ignore[arg-type]
 
 
-def extent(surfaces: Iterable[Surface], aperture: float) -> tuple[float, float]:
+def sample_extent(surfaces: Iterable[Surface], aperture: float) -> tuple[float, float]:
     """Extent of a sample from the axis (at least the image), and from z = 0 to either side, metres."""
     bounds = np.array([surface.mesh.bounds for surface in surfaces])
     aside = float(np.abs(bounds[:, :, :2]).max())

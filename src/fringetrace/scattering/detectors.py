@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
+from fringetrace.geometry import IndexArray
 from fringetrace.scene import CCD
 from fringetrace.tracing import Fate, Paths, project
 
-IndexArray = npt.NDArray[np.int64]
 # Of each direction: which paths arrive, and their optical lengths in metres.
-Arrivals = Iterator[tuple[IndexArray, FloatArray]]
+DirectionPaths = Iterator[tuple[IndexArray, FloatArray]]
 
 
 def towards(theta: npt.ArrayLike, phi: npt.ArrayLike) -> FloatArray:
@@ -108,7 +108,7 @@ class Detector(Protocol):
     def projected(self) -> FloatArray:
         """Projected solid angle of each direction, weighted with cos(theta), (theta, phi) float64, sr."""
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """Paths that arrive in each direction (theta-major), and their optical path lengths."""
 
 
@@ -182,7 +182,7 @@ class Cones:
         disc = np.pi * np.sin(self.half_angle) ** 2 * np.cos(self.theta)
         return np.repeat(disc[:, None], len(self.phi), axis=1)
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """Paths in each cone, see `Detector`; a path may be in several cones, or in none."""
         rows = _exits(paths)
         direction = paths.direction[rows]
@@ -234,7 +234,7 @@ class Cells:
         """Projected solid angle of each cell, (theta, phi) float64, sr; their sum is pi."""
         return self._rings(0.5 * np.sin(np.linspace(0.0, 0.5 * np.pi, self.rings + 1)) ** 2)
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """Paths in each cell, see `Detector`; each path that leaves upwards is in one cell."""
         rows = _exits(paths)
         x, y, z = paths.direction[rows].T
@@ -291,7 +291,7 @@ class Pixels:
         """Projected solid angle of each pixel, (theta, phi) float64, sr."""
         return self.solid_angle * np.cos(self.theta)[:, None]
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """Paths on each pixel, see `Detector`; a path may fall on several pixels, or on none."""
         met = paths.bounces > 0
         for theta in self.theta:
@@ -306,7 +306,7 @@ class Pixels:
         return CCD(centre + self.distance * axis, -axis, up, self.width, (1, 1))
 
 
-def everything(paths: Paths, detector: Detector, centre: FloatArray) -> Arrivals:
+def fraunhofer_paths(paths: Paths, detector: Detector, centre: FloatArray) -> DirectionPaths:
     """All paths that met something and left, for each direction of a detector (Fraunhofer sum).
 
     Parameters

@@ -14,7 +14,7 @@ from fringetrace.scene.model import Scene, Surface
 COPLANAR = 1e-9
 
 
-def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
+def group_facets(scene: Scene) -> list[npt.NDArray[np.int64]]:
     """Facet groups of each surface: facets of one plane, or connected facets on a form.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from fringetrace.core import ComplexArray, FloatArray
 from fringetrace.field.pixel_quadrature import Samples, averaged, edges
 from fringetrace.field.wavefront import curved_waves, patches, plane_waves
-from fringetrace.field.wavefront.patches import Cells
+from fringetrace.field.wavefront.patches import PatchCells
 from fringetrace.field.wavefront.plane_waves import Region, Wave
 from fringetrace.field.wavefront.visibility import survey
 from fringetrace.scene import Beam
@@ -39,7 +39,7 @@ class Light:
     beam: Beam
     unit: float
     plane: list[tuple[int, Wave, Region]]
-    curved: list[tuple[int, Cells]]
+    curved: list[tuple[int, PatchCells]]
     segments: FloatArray
 
 
@@ -86,7 +86,7 @@ def light(
         return Light(beam, unit, [], curved, np.empty((0, 4)))
     surveyed = survey(paths, half_wave_loss, axis)
     member = {name: group(key) for name, key in zip(surveyed.names, surveyed.keys, strict=True)}
-    plane = [(member[wave.name], wave, region) for wave, region in plane_waves.waves(surveyed)]
+    plane = [(member[wave.name], wave, region) for wave, region in plane_waves.plane_waves_of(surveyed)]
     cells, rim = curved_waves.curved(surveyed)
     named = [member[name] for name in surveyed.names[surveyed.curved]]
     drawn = [wave.to_pixels(region.segments).reshape(-1, 4) for _, wave, region in plane]
@@ -138,7 +138,7 @@ def fields(
         field = points.blank(groups)
         for beam in lights:
             for group, wave, region in beam.plane:
-                plane_waves.spread(wave, region, beam.beam, period, points, field[group], slope)
+                plane_waves.add_plane_wave(wave, region, beam.beam, period, points, field[group], slope)
         for group, sheet, phase in curved:
             field[group] += uniform_airy.light(sheet, points, slope) * phase
         return field

@@ -46,7 +46,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class PatchCells:
     """Cells of a wavefront in the form that the kernels read; for `place` see `leaved`."""
 
     coefficients: FloatArray
@@ -257,7 +257,7 @@ def leaved(
     domain: FloatArray,
     lines: FloatArray,
     ccd: CCD,
-) -> Cells:
+) -> PatchCells:
     """Cells with their quadtree leaves.
 
     Parameters
@@ -281,7 +281,7 @@ def leaved(
     """
     from fringetrace.field.wavefront import raster_kernels
 
-    leaves = raster_kernels.split(np.ascontiguousarray(coefficients[owner]), domain, lines, *ccd.shape)
+    leaves = raster_kernels.split_cells(np.ascontiguousarray(coefficients[owner]), domain, lines, *ccd.shape)
     leaves[:, raster_kernels.CELL] = owner[leaves[:, raster_kernels.CELL].astype(np.int64)]
     folded = np.zeros(len(coefficients), dtype=np.bool_)
     signs = np.zeros((len(coefficients), 2), dtype=np.bool_)
@@ -291,10 +291,10 @@ def leaved(
         ] = True
     folded[leaves[leaves[:, raster_kernels.SIGN] == 0.0, raster_kernels.CELL].astype(np.int64)] = True
     folded |= signs.all(axis=1)
-    return Cells(np.ascontiguousarray(coefficients), leaves, folded, turns, base, place)
+    return PatchCells(np.ascontiguousarray(coefficients), leaves, folded, turns, base, place)
 
 
-def cells(sheet: Sheet, ccd: CCD) -> Cells:
+def cells(sheet: Sheet, ccd: CCD) -> PatchCells:
     """Bicubic Hermite patches between the nodes of a grid, with their quadtree leaves.
 
     At the rim of the beam's grid a cell reaches on to the rim of the beam, half a cell beyond the rays.

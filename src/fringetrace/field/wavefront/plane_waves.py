@@ -14,7 +14,7 @@ from fringetrace.field.wavefront.boundary_search import cut
 from fringetrace.field.wavefront.probe import RIM, profile
 from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
-from fringetrace.optics import refracted
+from fringetrace.optics import refract
 from fringetrace.scene import CCD, Beam, Surface
 from fringetrace.tracing import Paths, indices, landed
 
@@ -91,7 +91,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     for k, (surface, normal) in enumerate(_met(paths, row)):
         leaving = onward[k] / np.linalg.norm(onward[k])
         turned = direction - 2.0 * (direction @ normal) * normal
-        bent = refracted(direction, normal, index[k], index[k + 1])
+        bent = refract(direction, normal, index[k], index[k + 1])
         if hasattr(surface.interface, "act"):
             bent = leaving
         # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
@@ -132,7 +132,7 @@ def _near(wave: Wave, row: Array, column: Array, ccd: CCD) -> npt.NDArray[np.boo
     return np.asarray(across & (y.max(axis=1) > 0) & (y.min(axis=1) < rows))
 
 
-def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
+def plane_waves_of(survey: Survey) -> Iterator[tuple[Wave, Region]]:
     """Plane waves on a CCD off the facets of a scene, and their regions of the beam.
 
     Parameters
@@ -222,7 +222,7 @@ def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64
     return np.asarray(np.clip(window, 0, limits), dtype=np.int64)
 
 
-def spread(
+def add_plane_wave(
     wave: Wave, region: Region, beam: Beam, period: float, points: Samples, field: ComplexArray,
     slope: FloatArray,
 ) -> None:  # fmt: skip
@@ -239,7 +239,7 @@ def spread(
     field : (points,) complex128
         Added to.
     slope : (points, 4) float64, metres a pixel, or (0, 4)
-        Widened, see `raster.spread`.
+        Widened, see `raster.add_plane_wave`.
     """
     from fringetrace.field.wavefront import raster_kernels
 

@@ -21,7 +21,7 @@ FUZZ = 1e-8
 class Probe:
     """Ray query for the surface sequences that light takes from points of the beam.
 
-    `parts` are those of `parted`; `keys` the sequences that are looked at, of up to so many `bounces`;
+    `parts` are those of `group_facets`; `keys` the sequences that are looked at, of up to so many `bounces`;
     light fainter than `faintest` is not followed.
     Without `half_wave_loss` a reflection off a mirror changes no sign. Media are those at the `wavelength`;
     of light with a polarisation the amplitude is the field along an `axis` (3,).

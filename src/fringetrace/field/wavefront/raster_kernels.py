@@ -70,7 +70,7 @@ def survey(cells, cell, s0, s1, t0, t1):
 
 
 @jit
-def split(cells, domain, lines, rows, columns):
+def split_cells(cells, domain, lines, rows, columns):
     """Quadtree leaves of cells, from their domains (s from and to, t from and to) and chords (a, b, c).
 
     Those that no pixel sees are left out.
@@ -173,7 +173,7 @@ def gradient(cells, cell, s, t):
 
 
 @jit
-def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y, field, slope):
+def add_leaves(leaves, cells, folded, turns, unit, period, top, columns, first, x, y, field, slope):
     """Add the waves of regular leaves to the sample points of a band of pixels from row `top` on.
 
     `folded` marks cells in which J changes its sign, `turns` has their caustics passed where J < 0

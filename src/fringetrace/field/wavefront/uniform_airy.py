@@ -34,7 +34,7 @@ from fringetrace.field.wavefront.fold_branches import (
     TURNS,
     WAY,
     Z,
-    beside,
+    branches_beside_folds,
     resolve,
     seeds,
     taken,
@@ -67,7 +67,7 @@ from fringetrace.field.wavefront.raster_kernels import (
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """Cells of a wavefront, see `patches.Cells`, with its folds.
+    """Cells of a wavefront, see `PatchCells`, with its folds.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def folds(
     Parameters
     ----------
     coefficients, leaves, folded, turns, place
-        Of `sheets.Cells`.
+        Of `patches.PatchCells`.
     period : float, metres
         Wavelength.
     unit : float
@@ -156,14 +156,14 @@ def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
         widen_beside(sheet.seeds, 2.0 * np.pi / sheet.period, *grid[:3], points.x, points.y, slope)
     if len(sheet.seeds):
         wavenumber = 2.0 * np.pi / sheet.period
-        rows = beside(
+        rows = branches_beside_folds(
             sheet.seeds, sheet.coefficients, sheet.index, sheet.lines, sheet.turns, wavenumber, *grid, latest
         )
         resolve(rows, latest)
         near |= touched(latest, points, sheet.leaves)
-    raster_kernels.spread(sheet.leaves[~near], *cells, *grid, field, slope)
+    raster_kernels.add_leaves(sheet.leaves[~near], *cells, *grid, field, slope)
     if near.any():
-        spread(sheet.leaves[near], *cells, sheet.place, rows, latest, *grid, field, slope)
+        add_folds(sheet.leaves[near], *cells, sheet.place, rows, latest, *grid, field, slope)
     np.add.at(field, rows[:, SAMPLE].astype(np.int64), np.sqrt(sheet.unit) * uniform(rows, sheet.period))
     return np.asarray(field, dtype=np.complex128)
 
@@ -253,10 +253,10 @@ def probe(cells, cell, leaf, sign):
 
 
 @jit
-def spread(
+def add_folds(
     leaves, cells, folded, turns, unit, period, place, rows, latest, top, columns, first, x, y, field, slope
 ):
-    """Add the waves of leaves on and beside folds, without those in `rows`; see `raster_kernels.spread`."""
+    """Add the waves of leaves on and beside folds, except `rows`; see `raster_kernels.add_leaves`."""
     for leaf in leaves:
         cell = int(leaf[CELL])
         low, above = max(int(np.floor(leaf[LOW])), top), int(np.floor(leaf[HIGH]))

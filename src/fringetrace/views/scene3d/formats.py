@@ -25,7 +25,7 @@ THIN, SIDES = 1e-3, 6
 UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
-def export(view: View, path: str | os.PathLike[str]) -> None:
+def write_view(view: View, path: str | os.PathLike[str]) -> None:
     """Export a view's surfaces and rays, in metres; the file is written atomically.
 
     Parameters

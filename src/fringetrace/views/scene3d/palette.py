@@ -72,7 +72,7 @@ class Scale:
         return np.round(np.stack(columns, axis=1)).astype(np.uint8)
 
 
-def checked(way: str, strands: Strands | None) -> str:
+def checked_colouring(way: str, strands: Strands | None) -> str:
     """Checked name of a colouring that is possible for the paths.
 
     Parameters
