@@ -1,4 +1,4 @@
-"""The error budget: how far an image is off its truth, by cause, in waves."""
+"""Error budget of an image, by cause, in waves."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ CAUSES = {
 
 @dataclass(frozen=True)
 class Budget:
-    """What each cause costs, in waves: an rms over the light on the CCD.
+    """Error budget: rms error in waves by cause, over the light on the CCD.
 
     A field E that is off by e counts as (rms of |e|) / (rms of |E|) / 2 pi waves: the rms error of
     phase, weighted with the irradiance, if phase is what is off.
@@ -65,7 +65,7 @@ class Budget:
 
     @property
     def total(self) -> float:
-        """Root of the sum of squares."""
+        """Total error: root of the sum of squares."""
         return math.hypot(self.hit, self.facets, self.sampling, self.pixels)
 
     def __str__(self) -> str:
@@ -75,12 +75,12 @@ class Budget:
 
     @property
     def line(self) -> str:
-        """The same in one line."""
+        """The budget on one line."""
         return ", ".join(f"{name} {getattr(self, name):.1e}" for name in CAUSES) + " waves rms"
 
 
 def budget(paths: Paths, wavelength: float, method: str = "auto") -> Budget:
-    """What rounding, facets, rays and pixels cost an image; see `Budget`.
+    """Error budget of an image: rounding, facets, ray sampling and pixel quadrature; see `Budget`.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def budget(paths: Paths, wavelength: float, method: str = "auto") -> Budget:
 
 
 def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
-    """The same beam through the same scene, with another grid of rays.
+    """Trace the same beam with another grid of rays.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def _rms(values: Array, weight: Array) -> float:
 
 
 def hit_error(paths: Paths, wavelength: float) -> float:
-    """Rounding of the optical paths; see `contacts.rounding`.
+    """Rounding error of the optical paths in waves; see `path_errors.rounding`.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def hit_error(paths: Paths, wavelength: float) -> float:
 
 
 def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, float] | None]:
-    """What it costs that facets are not the smooth surface behind them.
+    """Facet error: path error of flat facets against the smooth surface behind them, in waves.
 
     A facet that stands off by s makes a path longer by s (n' d' - n d) along its normal: 2 s cos(incidence)
     off a mirror. One that leans by e turns the ray by g e, 2 e off a mirror: after a way of L it lands
@@ -235,7 +235,7 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
 
 
 def narrowing(paths: Paths) -> FloatArray:
-    """Width of the light of each path key on the CCD as a part of its width in the beam.
+    """Width of the light of each path key on the CCD, relative to its width in the beam.
 
     Parameters
     ----------

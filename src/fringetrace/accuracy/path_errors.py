@@ -24,7 +24,7 @@ from fringetrace.tracing import (
 
 
 def hit_offsets(bounces: Met) -> Array:
-    """Rounding of the hits: how far each stands off its facet, or off the form behind it.
+    """Distance of each hit from its facet, or from the exact form behind it.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def hit_offsets(bounces: Met) -> Array:
 
 
 def flattening(bounces: Met) -> tuple[FloatArray, FloatArray]:
-    """What facets leave out of the smooth surface that they may stand for; see `facets.standoff`.
+    """Sag and slope error of facets at hits, against the smooth surface behind; see `standoff`.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def flattening(bounces: Met) -> tuple[FloatArray, FloatArray]:
 
 
 def curvature(bounces: Met) -> FloatArray:
-    """How the normal of the surface turns from place to place: dn = C dp; 0 on facets.
+    """Curvature of the surface at hits: dn = C dp; 0 on facets.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def _lengths(paths: Paths) -> FloatArray:
 
 
 def rounding(paths: Paths) -> FloatArray:
-    """Error of the optical path of each path by the rounding of float64, measured.
+    """Rounding error of the optical path of each path, measured.
 
     The recorded points are compared with the facets and forms that they should lie on, and the
     optical path with the way from point to point, in longer numbers. A path whose points lie on the

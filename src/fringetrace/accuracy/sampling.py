@@ -1,4 +1,4 @@
-"""What the number of rays, and of points in a pixel, costs a field: in waves, without knowing the truth."""
+"""Sampling errors of a field: by the number of rays and by the quadrature in pixels, in waves."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
 
 
 def sample_bands(ccd: CCD, height: int = ROWS) -> list[CCD]:
-    """Parts of a CCD that stand for all of it: some rows near its lower end, its middle, its upper end.
+    """Bands of a CCD that represent all of it: rows near its lower end, its middle, its upper end.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def _cut(ccd: CCD, row: int, rows: int, columns: int, size: int = 1) -> CCD:
 
 
 def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0) -> float:
-    """What the number of rays costs the wavefront method.
+    """Sampling error of the wavefront method, from coarser grids of rays.
 
     The error falls from grid to grid as it is seen to fall, by 16 at most: the method's fourth order.
 
@@ -100,7 +100,7 @@ def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0
 
 
 def quadrature_error(paths: Paths, wavelength: float) -> float:
-    """What the points in each pixel cost the wavefront method: some more of them along either axis.
+    """Quadrature error of the wavefront method, from more points along either axis of the pixels.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
 
 
 def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
-    """Rays that stand for the mean of their plane wave over their part of the pixel that they fall in.
+    """Rays averaged as plane waves over their part of a pixel.
 
     Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
     part, see `centred`, and has its amplitude times sinc of the cycles over the part, along either side.
@@ -149,7 +149,7 @@ def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
 
 
 def offset_error(paths: Paths, wavelength: float) -> float:
-    """What it costs the ray sum that a ray counts where it lands, not by its mean over part of the pixel.
+    """Offset error of the ray sum: rays count where they land, not as means over part of a pixel.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def offset_error(paths: Paths, wavelength: float) -> float:
 
 
 def count_error(paths: Paths, wavelength: float) -> float:
-    """What it costs the ray sum that pixels get more or fewer rays than their share of light.
+    """Counting error of the ray sum: pixels get more or fewer rays than their share of light.
 
     Every second ray either way, on pixels twice as large, against all of them: there are as many
     rays a pixel, so the smaller sum is off by as much as the image itself.

@@ -1,4 +1,4 @@
-"""Units at the door, and the way from optical path to phase and back."""
+"""Units: lengths and angles parsed from text, wavelength checks, optical path to phase and back."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def filled(values: npt.ArrayLike, dtype: npt.DTypeLike = np.float64) -> Array:
 
 
 def unit_of(length: float) -> tuple[str, float]:
-    """The unit in which a length has a few digits before the point.
+    """Unit in which a length has few digits before the decimal point.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def _parse(text: str, what: str, units: dict[str, float]) -> float:
 
 
 def checked_length(value: float, what: str) -> float:
-    """The length itself, once it is known to be one.
+    """Checked finite length in metres.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def checked_whole(value: int, least: int, what: str) -> int:
 
 
 def parse_length(text: str, what: str = "length") -> float:
-    """Length in text, in metres.
+    """Length in metres, parsed from text with a unit.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def parse_length(text: str, what: str = "length") -> float:
 
 
 def parse_angle(text: str, what: str = "angle") -> float:
-    """Angle in text, in radians; raises like `parse_length`.
+    """Angle in radians, parsed from text with a unit; raises like `parse_length`.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ def parse_angle(text: str, what: str = "angle") -> float:
 
 
 def unit_length(unit: str | None, what: str = "unit") -> float:
-    """Metres in one of a named unit.
+    """Metres per named length unit.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def unit_length(unit: str | None, what: str = "unit") -> float:
 
 
 def checked_wavelength(wavelength: float) -> float:
-    """The wavelength itself, once it is known to be one.
+    """Checked wavelength in metres: finite and positive.
 
     Parameters
     ----------
@@ -302,7 +302,7 @@ def wavenumber(wavelength: float) -> float:
 
 
 def path_phase(length: FloatArray | float, wavelength: float) -> FloatArray:
-    """Phase of an optical path, reduced modulo the wavelength before it is scaled.
+    """Phase of an optical path, reduced modulo the wavelength before scaling.
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def path_phase(length: FloatArray | float, wavelength: float) -> FloatArray:
 
 
 def phase_path(phase: FloatArray | float, wavelength: float) -> FloatArray:
-    """Optical path that belongs to a phase: phase * wavelength / (2 pi).
+    """Optical path of a phase: phase * wavelength / (2 pi).
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def phase_path(phase: FloatArray | float, wavelength: float) -> FloatArray:
 
 
 def checked_wavelengths(wavelengths: npt.ArrayLike) -> FloatArray:
-    """Wavelengths as an array, once they are known to be some.
+    """Checked wavelengths in metres, as an array.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Vectors of shape (n, 3) in float64, and the frames that rectangles live in."""
+"""Vectors of shape (n, 3) in float64, rotations, and the axes of rectangles."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ROUNDED = 4.0 * float(np.finfo(np.float64).eps)
 
 
 def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
-    """One finite vector.
+    """Checked finite vector of three components.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
 
 
 def checked_direction(value: npt.ArrayLike, what: str) -> FloatArray:
-    """One direction, scaled to unit length; a unit vector stays as it is, to the last bit.
+    """Checked direction, scaled to unit length; unit vectors stay the same to the last bit.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def unit(vectors: FloatArray) -> FloatArray:
 
 
 def component(vectors: FloatArray, axis: FloatArray) -> FloatArray:
-    """Components along one axis.
+    """Components of vectors along one axis.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def dot(a: Array, b: Array) -> Array:
 
 
 def frame(normal: npt.ArrayLike, up: npt.ArrayLike, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Axes of a rectangle seen along `normal`; (v, u, n) is right-handed.
+    """Axes (u, v) of a rectangle seen along its normal n; (v, u, n) is right-handed.
 
     u = normal x up is to the right of somebody who looks along `normal` with `up` up;
     v is `up` without its part along `normal`.
@@ -153,7 +153,7 @@ def frame(normal: npt.ArrayLike, up: npt.ArrayLike, what: str) -> tuple[FloatArr
 
 
 def checked_rotation(value: npt.ArrayLike, what: str) -> FloatArray:
-    """One rotation matrix.
+    """Checked rotation matrix.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def checked_rotation(value: npt.ArrayLike, what: str) -> FloatArray:
 
 
 def rotation(axis: npt.ArrayLike, angle: float) -> FloatArray:
-    """Matrix of a right-handed turn (Rodrigues).
+    """Rotation matrix about an axis, right-handed (Rodrigues).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From arrivals to light on the pixels: complex fields, irradiance, mutual intensity."""
+"""Coherent sum on the pixels: complex field, irradiance and mutual intensity of traced paths."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SHARING, FEW = 16, 64
 
 
 def method_for(paths: Paths) -> str:
-    """The method that "auto" stands for.
+    """Method that "auto" stands for: wavefront or ray sum.
 
     "wavefront" for a `Beam` whose rays are at least `SHARING` times as many as the flat facets of the
     scene (coplanar triangles are one; surfaces with a form have none), or where those are `FEW`;
@@ -46,7 +46,7 @@ def method_for(paths: Paths) -> str:
 
 
 def torn(paths: Paths) -> str | None:
-    """Name of a surface that tears waves: an element behind which neighbouring rays may fare differently.
+    """Name of a surface that tears wavefronts: an element that treats neighbouring rays differently.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def complex_field(
     half_wave_loss: bool = True,
     groups: npt.ArrayLike | None = None,
 ) -> ComplexArray:
-    """Complex field on the pixels of the CCD.
+    """Complex field, averaged over each pixel of the CCD.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def mutual_intensity(
     method: str = "auto",
     half_wave_loss: bool = True,
 ) -> ComplexArray:
-    """Mean over each pixel of E_m conj(E_n), for the fields of groups of paths.
+    """Mutual intensity E_m conj(E_n) of groups of paths, averaged over each pixel.
 
     What a camera sees of groups whose phases are stepped by d_m is the sum of J_mn exp(i (d_m - d_n)).
 
@@ -152,7 +152,7 @@ def mutual_intensity(
 
 
 def products(fields: ComplexArray) -> ComplexArray:
-    """E_m conj(E_n) of fields, summed over the components of light with a polarisation.
+    """Products E_m conj(E_n) of fields, summed over the components of polarised light.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def products(fields: ComplexArray) -> ComplexArray:
 def irradiance(
     paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto", half_wave_loss: bool = True
 ) -> FloatArray:
-    """Irradiance averaged over each pixel of the CCD.
+    """Irradiance |E|^2, averaged over each pixel of the CCD.
 
     Overlapping sheets add before the square is taken, at as many points of each pixel as their
     fringes ask for: the mean of |E|^2, not the square of the mean field.
@@ -202,7 +202,7 @@ def irradiance(
 
 
 def chosen(paths: Paths, method: str) -> str:
-    """A method, "auto" resolved.
+    """Method of the coherent sum, with "auto" resolved.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sample points on the pixels: how many a fringe needs, where they lie, and the means over pixels."""
+"""Quadrature over pixels: number and position of sample points, and means over each pixel."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ T = TypeVar("T")
 
 
 def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
-    """Gauss points that integrate so many cycles of a wave over an interval.
+    """Number of Gauss points that integrate so many cycles of a wave over an interval.
 
     n points miss exp(i pi c u) over -1 < u < 1 by about (e pi c / 4 n)^2n (remainder of the Gauss
     rule, with Stirling's formula).
@@ -62,7 +62,7 @@ def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
 
 
 def gauss_table(orders: Array) -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights on [0, 1] of the Gauss-Legendre rules.
+    """Nodes and weights of the Gauss-Legendre rules on [0, 1].
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Samples:
     where_y: FloatArray
 
     def blank(self, groups: int) -> ComplexArray:
-        """No light yet: (groups, points) zeros."""
+        """Zero field at the sample points, (groups, points)."""
         return np.zeros((groups, len(self.x)), dtype=np.complex128)
 
     def means(self, field: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
@@ -130,7 +130,7 @@ Light = Callable[[Samples, FloatArray], ComplexArray]
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Segments that edges of sheets draw on the pixels.
+    """Edges of wavefronts as line segments on the pixels.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ class Edges:
 
 
 def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
-    """Which segments cross which pixels.
+    """Pixels that each segment crosses.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
 
 
 def samples(order: npt.NDArray[np.int64], top: int, cuts: Edges | None = None) -> Samples:
-    """Points of a band of pixels: Gauss points, or, where edges cross, points of the pieces.
+    """Sample points of a band of pixels: Gauss points, or points of the pieces where edges cross.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def bands(order: Array) -> list[tuple[int, int]]:
 
 
 def fringes(slope: FloatArray, carrier: bool) -> FloatArray:
-    """Steepest change of phase over each pixel and its neighbours, as a path.
+    """Steepest change of optical path over each pixel and its neighbours.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def averaged(
     cuts: Edges | None = None,
     more: int = 0,
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Means over the pixels of the fields of some groups, and of their products.
+    """Means over the pixels of the fields of groups, and of their products.
 
     Where light is even its value at the centre will do, with a quarter of a quarter of its curvature:
     the mean of f over a pixel is f + (f_xx + f_yy) / 24 to fourth order (Euler and Maclaurin).
@@ -310,7 +310,7 @@ def averaged(
 
 
 def mutual_products(field: ComplexArray) -> ComplexArray:
-    """E_m conj(E_n) of fields.
+    """Products E_m conj(E_n) of fields.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rays placed at the centre of their part of a pixel, for the ray sum."""
+"""Ray sum: rays moved to the centre of their part of a pixel."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from fringetrace.tracing import Paths
 
 
 def centred(paths: Paths, parts: int = 1) -> Paths:
-    """Paths continued, as plane waves, to the centres of the pixels (or of parts of them) they fall in.
+    """Continue paths, as plane waves, to the centres of the pixels (or parts of them) they fall in.
 
     A ray that lands beside the centre brings the phase of where it landed; summed as it is, a
     tilted wave would be sampled on a grid other than that of the pixels.

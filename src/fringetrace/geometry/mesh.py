@@ -1,4 +1,4 @@
-"""The noun Mesh: triangles in space, checked once, at the door."""
+"""Triangle mesh: vertices in metres and faces, checked once."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _check_shape(vertices: FloatArray, faces: npt.NDArray[np.int64], name: str) 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Where a mesh came from, by which a scene file can refer to it.
+    """Origin of a mesh (file and moves), by which a scene file can refer to it.
 
     Parameters
     ----------
@@ -117,13 +117,13 @@ class Source:
     moves: tuple[tuple[FloatArray, FloatArray | None], ...] = ()
 
     def moved(self, offset: FloatArray, turn: FloatArray | None) -> Source:
-        """The same after one more move."""
+        """The same origin after one more move."""
         return Source(self.path, self.unit, (*self.moves, (offset, turn)))
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in space.
+    """Triangle mesh: vertices in metres and faces.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class Mesh:
 
     @staticmethod
     def cleaned(vertices: npt.ArrayLike, faces: npt.ArrayLike, name: str = "mesh") -> Mesh:
-        """A mesh without the faces that have no area.
+        """Mesh without the faces of zero area.
 
         Parameters
         ----------
@@ -183,12 +183,12 @@ class Mesh:
 
     @cached_property
     def bounds(self) -> FloatArray:
-        """(2, 3) float64, metres: lower and upper corner of what the faces span."""
+        """Bounding box of the faces, (2, 3) float64, metres: lower and upper corner."""
         corners = self.vertices[self.faces].reshape(-1, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Mesh:
-        """The mesh turned about the origin, then shifted.
+        """Mesh rotated about the origin, then shifted.
 
         Parameters
         ----------
@@ -213,7 +213,7 @@ class Mesh:
 
 
 def as_mesh(value: Any, name: str = "mesh") -> Mesh:
-    """A Mesh from one of another library, whose numbers are taken as metres.
+    """Mesh converted from trimesh or pyvista, whose numbers are taken as metres.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The arms of a bench: which light a phase step turns, and how a tilted one rises."""
+"""Arms of an interferometer: which light a phase step shifts, and the slope of a tilted wave."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fringetrace.tracing import Paths
 
 @dataclass(frozen=True)
 class Mark:
-    """What tells the arms of a bench apart: how often light met a surface.
+    """Marker of an arm: counts how often light met a surface.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ class Mark:
     sense: int = 1
 
     def count(self, paths: Paths) -> npt.NDArray[np.int64]:
-        """How often each path did.
+        """Number of times each path met the marked surface.
 
         Parameters
         ----------
@@ -65,7 +65,7 @@ class Mark:
 
 
 def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:
-    """Rise of the optical path of a beam off a tilted plane mirror, on a plane across the beam.
+    """Slope of the optical path of a beam off a tilted plane mirror, on a plane across the beam.
 
     A mirror tilted by a turns the beam by 2a; the plane wave's path then rises by sin 2a a
     metre in the direction of the tilt.

@@ -1,4 +1,4 @@
-"""A bench: what is recorded with a rig, and what follows."""
+"""Interferometer: recorded images, phase steps and heights."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ if TYPE_CHECKING:
 
 
 def step_axis(steps: int) -> Coordinates:
-    """The axis of phase-stepped frames: a period in equal steps, radians."""
+    """Axis of phase-stepped frames: equal steps over a period, radians."""
     return {"step": (2.0 * math.pi * np.arange(steps) / steps, "rad")}
 
 
 class Bench(Rig):
-    """An interferometer: what its CCD records, phase steps, heights.
+    """Interferometer: images on its CCD, phase steps, heights, error budget.
 
     It is traced once; wavelengths and phase steps then re-use the paths. Parameters are those of `Rig`.
     """
 
     def field(self, wavelength: float, step: float = 0.0) -> ComplexArray:
-        """Field on the CCD.
+        """Complex field on the CCD.
 
         Parameters
         ----------
@@ -50,7 +50,7 @@ class Bench(Rig):
         return np.asarray(np.tensordot(turns, fields, axes=1), dtype=np.complex128)
 
     def interferogram(self, light: Light, *, modulus: bool = False, step: float = 0.0) -> FloatArray:
-        """What the CCD records.
+        """Interferogram: irradiance on the CCD.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class Bench(Rig):
         return np.asarray(image, dtype=np.float64)
 
     def budget(self, wavelength: float) -> Budget:
-        """What rounding, facets, rays and pixels cost the image, in waves.
+        """Error budget of the image, in waves: rounding, facets, sampling, pixels.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class Bench(Rig):
         return costs
 
     def phase_steps(self, light: Light, steps: int = 4) -> FloatArray:
-        """Frames of a phase-stepped recording: frame k adds 2 pi k / steps to the reference.
+        """Phase-stepped frames: frame k adds 2 pi k / steps to the phase of the reference.
 
         Parameters
         ----------
@@ -134,7 +134,7 @@ class Bench(Rig):
         return self._kept(light, f"{steps} steps", frames).copy()
 
     def carrier(self, wavelength: float) -> FloatArray:
-        """Phase of the tilted reference wave over the pixels, 0 at the centre of the image.
+        """Carrier phase of the tilted reference wave over the pixels, 0 at the centre of the image.
 
         A plane wave off a plane mirror turned by a: its path on the CCD rises by sin 2a a metre
         along the tilt, exactly (times the index of the `immersion`).
@@ -155,7 +155,7 @@ class Bench(Rig):
         return np.asarray(wavenumber(wavelength) * path, dtype=np.float64)
 
     def wrapped(self, wavelength: float, steps: int = 4) -> FloatArray:
-        """Phase by which the reference leads the sample, from phase-stepped frames, wrapped.
+        """Wrapped phase of the reference relative to the sample, from phase-stepped frames.
 
         Parameters
         ----------
@@ -173,7 +173,7 @@ class Bench(Rig):
         return np.where(lit, phase.n_bucket(frames), np.nan)
 
     def height(self, wavelength: float, steps: int = 4) -> FloatArray:
-        """Height of the sample, the way one measures it: phase steps, carrier off, unwrap, scale.
+        """Height of the sample as measured: phase steps, carrier removal, unwrapping, scaling.
 
         Parameters
         ----------
@@ -198,7 +198,7 @@ class Bench(Rig):
         return phase.height(phase.unwrap(flat), wavelength)
 
     def path_difference(self, wavelength: float, steps: int = 4) -> FloatArray:
-        """Optical path that the sample adds to its arm: phase steps, carrier off, unwrapped.
+        """Optical path that the sample adds to its arm, from phase steps, unwrapped.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class Bench(Rig):
         return np.asarray(-2.0 * self.height(wavelength, steps), dtype=np.float64)
 
     def dataset(self, wavelength: float, steps: int = 4) -> Dataset:
-        """Everything that is recorded at a wavelength, labelled: for xarray, plots, and NetCDF files.
+        """Labelled dataset of all that is recorded at a wavelength, for xarray and NetCDF.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The Mach-Zehnder interferometer: one arm goes through the sample, once."""
+"""Mach-Zehnder interferometer: one arm passes the sample once."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def mach_zehnder(
     method: str = "auto",
     design: float = DESIGN,
 ) -> Bench:
-    """A Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
+    """Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
 
     Light goes through the sample along +z; the camera looks back at it, its columns along x and its rows
     along y, focused on a plane inside of the sample: rays are carried back to it along the lines on which

@@ -1,4 +1,4 @@
-"""Ready benches: the Michelson, and the others by name."""
+"""Michelson (Twyman-Green) interferometer."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def michelson(
     focus: bool = True,
     method: str = "auto",
 ) -> Bench:
-    """A Michelson (Twyman-Green) interferometer with the sample in one arm.
+    """Michelson (Twyman-Green) interferometer with the sample in one arm.
 
     The splitter stands at the origin at 45 degrees. The source at (-arm, 0, 0) fires along +x;
     half of the light goes down to the sample at (0, 0, -arm), half on to the reference mirror

@@ -1,4 +1,4 @@
-"""What a CCD recorded, labelled: coordinates in metres, units, wavelength, and which way is up."""
+"""Recorded images as labelled datasets: coordinates in metres, units, wavelength, orientation."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NOTES: dict[str, dict[str, str]] = {
 
 
 def coordinates(shape: tuple[int, int], pitch: float) -> dict[str, Any]:
-    """Where pixels are, for xarray.
+    """Pixel coordinates for xarray.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def _without_mask(values: Any) -> Array:
 def dataset(
     images: Mapping[str, Any], pitch: float, axes: tables.Coordinates | None = None, **attributes: Any
 ) -> Dataset:
-    """Images of one CCD as a labelled dataset: interferograms, fields, phase and height maps.
+    """Labelled dataset of images of one CCD: interferograms, fields, phase and height maps.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A rig: a scene, its beam and its CCD, traced once; the light of its arms on the pixels."""
+"""Interferometer trace: a scene with beam and CCD, traced once; fields of its arms on the pixels."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Light = float | Spectrum | Line
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """An interferometer: a scene lit by one beam, seen by one CCD, with a reference arm.
+    """Interferometer: a scene lit by one beam, seen by one CCD, with a reference arm.
 
     It is traced once; wavelengths and phase steps then re-use the paths. Where media bend or split light
     another way at another wavelength, it is traced once a wavelength (the last one is kept): `traced` says
@@ -72,7 +72,7 @@ class Rig:
 
     @property
     def traced(self) -> tuple[float | None, ...]:
-        """Wavelengths (metres) that it has been traced at, one after the other; None: one trace for all."""
+        """Wavelengths (metres) of the traces so far; None: one trace for all wavelengths."""
         return tuple(self.derived.get("traced", ()))
 
     def trace(
@@ -82,7 +82,7 @@ class Rig:
         progress: Callable[[int, int], None] | None = None,
         threads: int | None = None,
     ) -> Paths:
-        """All paths of the bench, traced at the first call and kept.
+        """Trace all paths at the first call, and keep them.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class Rig:
         return served
 
     def shut(self, arm: str) -> Self:
-        """The same bench with a black shutter in one arm: its light ends there and is not traced on.
+        """The interferometer with a shutter in one arm, whose light ends there.
 
         Parameters
         ----------
@@ -147,7 +147,7 @@ class Rig:
         return replace(self, scene=replace(self.scene, surfaces=tuple(surfaces)))
 
     def sampled(self, shape: tuple[int, int], wavelength: float | None = None) -> Paths:
-        """Paths of a coarser grid of rays over the same beam, with their polylines, to look at.
+        """Recorded paths of a coarser ray grid over the same beam, for drawing.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class Rig:
         )  # fmt: skip
 
     def reach(self, wavelength: float) -> float:
-        """Largest difference between the optical paths of any light on the CCD.
+        """Largest optical path difference between any light on the CCD.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class Rig:
         return float(np.ptp(length)) if len(length) else 0.0
 
     def spectrum(self, light: Light) -> Spectrum:
-        """The wavelengths that stand for light.
+        """Discrete spectrum that represents the light.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class Rig:
         return Spectrum(np.array([checked_wavelength(light)]), np.ones(1))
 
     def fields(self, wavelength: float) -> ComplexArray:
-        """Mean fields on the pixels, one for each count of the `mark`: of visits to the reference mirror.
+        """Mean fields on the pixels, one per count of the `mark` (visits to the reference mirror).
 
         Parameters
         ----------
@@ -217,7 +217,7 @@ class Rig:
         return self._kept(wavelength, "fields", lambda: self._found(wavelength, complex_field))
 
     def mutual(self, light: Light) -> ComplexArray:
-        """Mutual intensities on the pixels of the light with m and n visits to the reference mirror.
+        """Mutual intensities on the pixels of light with m and n visits to the reference mirror.
 
         Parameters
         ----------
@@ -283,7 +283,7 @@ class Rig:
         progress: Callable[[int, int], None] | None = None,
         threads: int | None = None,
     ) -> ComplexArray:
-        """`fields` by ray sum, while tracing: no path is kept, so memory does not grow with the rays.
+        """Fields by ray sum while tracing: keeps no paths, so that memory does not grow with the rays.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Frames of a camera as 16-bit TIFF files, with what one count is worth, in and out."""
+"""Camera frames as 16-bit TIFF files with the value of one count: writing and reading."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEADING = ("set", "frame")
 
 
 def counts(images: FloatArray, full_scale: float) -> Array:
-    """Irradiance as a 16-bit camera counts it, top row first.
+    """Irradiance in 16-bit camera counts, top row first.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def save(
     full_scale: float | None = None,
     **notes: Any,
 ) -> None:
-    """Write irradiances as a 16-bit TIFF file; it is there in full or not at all.
+    """Save irradiances as a 16-bit TIFF file, atomically.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def save(
 
 
 def load(path: str | os.PathLike[str]) -> DataArray:
-    """Irradiances from a TIFF file that `save` or the command wrote.
+    """Load irradiances from a TIFF file that `save` or the command wrote.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Compiled loops of bare faces, and of thin films by their characteristic matrices: amplitudes."""
+"""Compiled Fresnel coefficients of bare interfaces, and characteristic matrices of thin films."""
 
 from __future__ import annotations
 
@@ -125,19 +125,19 @@ def forward(squared):
 
 @part
 def flow(index, normal):
-    """Power through a boundary of s and of p light of unit amplitude: n cos, but in an absorbing medium."""
+    """Power flux through an interface for unit amplitude, s and p: n cos, except in absorbing media."""
     return normal.real, (index * (normal / index).conjugate()).real
 
 
 @part
 def shared(through, before):
-    """From amplitudes of E to those of power; nothing goes on where no power flows."""
+    """Amplitudes of power from amplitudes of E; nothing is transmitted where no power flows."""
     return np.sqrt(through / before) if through > 0.0 and before > 0.0 else 0.0
 
 
 @part
 def face_amplitudes(first, q1, last, q2):
-    """Fresnel's r_s, r_p, t_s, t_p, of E, from indices and normal parts n cos; signs as in `films`."""
+    """Fresnel coefficients r_s, r_p, t_s, t_p of E, from n and n cos of both sides; signs as in `films`."""
     a, b = last * last * q1, first * first * q2
     s, p = 1.0 / (q1 + q2), 1.0 / (a + b)
     return (q1 - q2) * s, (a - b) * p, 2.0 * q1 * s, 2.0 * first * last * q1 * p

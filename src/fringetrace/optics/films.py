@@ -1,4 +1,4 @@
-"""Thin films: reflection and transmission of plane waves by stacks of layers, and by bare faces.
+"""Thin films: reflection and transmission of plane waves by layer stacks and bare interfaces.
 
 Amplitudes are those of E with fields as exp(+i k n x). r of p light has Byrnes' sign: at normal
 incidence r_p = -r_s, and H is reflected with r_p. Sources: M. Born, E. Wolf, Principles of Optics,
@@ -29,7 +29,7 @@ class Amplitudes(NamedTuple):
 
 
 class PolarisedPowers(NamedTuple):
-    """Fractions of the power of s and of p light; arrays of one shape."""
+    """Power fractions of s and p light; arrays of one shape."""
 
     s: FloatArray
     p: FloatArray
@@ -37,7 +37,7 @@ class PolarisedPowers(NamedTuple):
 
 @dataclass(frozen=True)
 class Film:
-    """Layers on each other, in the order that light from the front meets them.
+    """Thin-film stack: layers in the order in which light from the front meets them.
 
     Parameters
     ----------
@@ -70,16 +70,16 @@ class Film:
 
     @property
     def thickness(self) -> FloatArray:
-        """(m,) float64, metres."""
+        """Layer thicknesses, (m,) float64, metres."""
         return np.array([thickness for _, thickness in self.layers], dtype=np.float64)
 
     @property
     def dispersive(self) -> bool:
-        """Whether an index may change with the wavelength."""
+        """Whether an index may depend on the wavelength."""
         return any(material.dispersive for material, _ in self.layers)
 
     def indices(self, wavelength: npt.ArrayLike) -> ComplexArray:
-        """Complex indices of the layers.
+        """Complex refractive indices of the layers.
 
         Parameters
         ----------
@@ -96,14 +96,14 @@ class Film:
         return out
 
     def reversed(self) -> Film:
-        """The film as light from behind meets it."""
+        """The stack in reverse order, as light from behind meets it."""
         return Film(self.layers[::-1])
 
 
 def quarter_wave_stack(
     high: Material | complex | str, low: Material | complex | str, pairs: int, wavelength: float
 ) -> Film:
-    """The dielectric mirror (HL)^pairs H: layers a quarter of a wave thick at normal incidence.
+    """Dielectric mirror (HL)^pairs H of quarter-wave layers at normal incidence.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ def coefficients(
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
 ) -> Amplitudes:
-    """Amplitudes of E behind and before a film between two half spaces.
+    """Amplitude coefficients of a film between two half-spaces: r_s, r_p, t_s, t_p of E.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def reflectance(
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
 ) -> PolarisedPowers:
-    """Fraction of the power that a film reflects, |r|^2; arguments as in `coefficients`.
+    """Reflectance of a film, |r|^2; arguments as in `coefficients`.
 
     Returns
     -------
@@ -222,7 +222,7 @@ def transmittance(
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
 ) -> PolarisedPowers:
-    """Fraction of the power that gets behind a film; arguments as in `coefficients`.
+    """Transmittance of a film; arguments as in `coefficients`.
 
     Returns
     -------
@@ -238,7 +238,7 @@ def transmittance(
 
 
 def fresnel(first: npt.ArrayLike, last: npt.ArrayLike, angle: npt.ArrayLike) -> Amplitudes:
-    """Fresnel's amplitudes of a bare face, from indices alone.
+    """Fresnel coefficients of a bare interface, from indices and angle of incidence.
 
     Parameters
     ----------

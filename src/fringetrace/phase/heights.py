@@ -1,4 +1,4 @@
-"""Wrapped phase to height: unwrapping, two wavelengths, planes taken off. Phase stepping is here too.
+"""Height from wrapped phase: unwrapping, synthetic wavelength, piston and tilt removal.
 
 What a numpy.ma array masks is unknown, and comes out as NaN.
 
@@ -49,7 +49,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 def wrap(phase: npt.ArrayLike) -> FloatArray:
-    """Phase modulo 2 pi.
+    """Wrap a phase modulo 2 pi into (-pi, pi].
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def _unwrapped(phase: FloatArray, valid: BoolArray) -> FloatArray:
 
 
 def unwrap(phase: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArray:
-    """Continuous phase of a wrapped map.
+    """Unwrap a phase map into a continuous one.
 
     The true phase must change by less than pi from pixel to pixel along enough ways through the map: a step
     higher than a quarter of the wavelength (in reflection) needs `two_wavelength`. Herraez 2002, as in
@@ -136,7 +136,7 @@ def unwrap(phase: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArra
 
 
 def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
-    """Height of a reflecting surface: phase * wavelength / (4 pi), towards the light.
+    """Height of a reflecting surface from its phase, phase * wavelength / (4 pi), towards the light.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
 
 
 def synthetic_wavelength(wavelength1: float, wavelength2: float) -> float:
-    """Wavelength of the beat of two others: l1 l2 / |l1 - l2| (Cheng 1984).
+    """Synthetic (beat) wavelength of two others: l1 l2 / |l1 - l2| (Cheng 1984).
 
     Parameters
     ----------
@@ -182,7 +182,7 @@ def synthetic_wavelength(wavelength1: float, wavelength2: float) -> float:
 def two_wavelength(
     phase1: npt.ArrayLike, phase2: npt.ArrayLike, wavelength1: float, wavelength2: float
 ) -> FloatArray:
-    """Height of a reflecting surface from its wrapped phases at two wavelengths.
+    """Height of a reflecting surface from wrapped phases at two wavelengths.
 
     The beat phase gives a coarse height, L wrap(phi1 - phi2) / (4 pi) with L the synthetic wavelength; the
     coarse height chooses the order of the phase at the shorter wavelength, which gives the fine one.
@@ -211,7 +211,7 @@ def two_wavelength(
 
 
 def remove_mean(values: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArray:
-    """A map without its piston.
+    """Remove the piston from a map.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def remove_mean(values: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> Flo
 
 
 def remove_plane(values: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArray:
-    """A map without its piston and tilt: minus the plane that fits it best in least squares.
+    """Remove piston and tilt from a map: subtract its least-squares plane.
 
     Raises like `remove_mean`.
 

@@ -58,7 +58,7 @@ def _root(square: FloatArray) -> FloatArray:
 
 
 def four_step(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of 0, 90, 180, 270 degrees: tan phi = (I4 - I2) / (I1 - I3).
+    """Phase from four steps of 0, 90, 180, 270 degrees: tan phi = (I4 - I2) / (I1 - I3).
 
     Creath 1988.
 
@@ -82,7 +82,7 @@ def four_step(frames: npt.ArrayLike) -> FloatArray:
 
 
 def three_step(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -120, 0, 120 degrees: tan phi = sqrt(3) (I1 - I3) / (2 I2 - I1 - I3).
+    """Phase from three steps of -120, 0, 120 degrees: tan phi = sqrt(3) (I1 - I3) / (2 I2 - I1 - I3).
 
     Creath 1988; raises like `four_step`.
 
@@ -101,7 +101,7 @@ def three_step(frames: npt.ArrayLike) -> FloatArray:
 
 
 def hariharan(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -180, -90, 0, 90, 180 degrees: tan phi = 2 (I2 - I4) / (2 I3 - I1 - I5).
+    """Phase from five steps of -180 to 180 degrees (Hariharan): tan phi = 2 (I2 - I4) / (2 I3 - I1 - I5).
 
     A step that is wrong by e shifts the phase only by up to e**2 / 4.
     Schwider 1983, Hariharan 1987; raises like `four_step`.
@@ -121,7 +121,7 @@ def hariharan(frames: npt.ArrayLike) -> FloatArray:
 
 
 def carre(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -3a, -a, a, 3a, for any a that is the same throughout, 0 < a < 90 degrees.
+    """Phase by Carre's algorithm from steps of -3a, -a, a, 3a, for any constant 0 < a < 90 degrees.
 
     With p = 3 (I2 - I3) - (I1 - I4) and q = (I2 - I3) + (I1 - I4),
     |tan phi| = sqrt(p q) / ((I2 + I3) - (I1 + I4)); the sign of sin phi is that of I2 - I3.
@@ -145,7 +145,7 @@ def carre(frames: npt.ArrayLike) -> FloatArray:
 
 
 def stoilov(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -2a, -a, 0, a, 2a, for any a that is the same throughout, 0 < a < 180 degrees.
+    """Phase by Stoilov's algorithm from steps of -2a, -a, 0, a, 2a, for any constant 0 < a < 180 degrees.
 
     tan phi = 2 (I2 - I4) sin a / (2 I3 - I1 - I5), where cos a = (I1 - I5) / (2 (I2 - I4)).
     Stoilov 1997; raises like `four_step`.
@@ -199,7 +199,7 @@ def n_bucket(frames: npt.ArrayLike) -> FloatArray:
 
 
 def least_squares(frames: npt.ArrayLike, steps: npt.ArrayLike) -> FloatArray:
-    """Phase from known steps of any size: least squares on A + C cos alpha_k + S sin alpha_k.
+    """Phase from known steps of any size, by least squares on A + C cos alpha_k + S sin alpha_k.
 
     Greivenkamp 1984.
 
@@ -236,7 +236,7 @@ def least_squares(frames: npt.ArrayLike, steps: npt.ArrayLike) -> FloatArray:
 
 
 def modulation(frames: npt.ArrayLike) -> FloatArray:
-    """Visibility B / A of the fringes, from n equal steps 2 pi k / n, n >= 3.
+    """Fringe visibility B / A from n equal steps 2 pi k / n, n >= 3.
 
     Creath 1988; raises like `n_bucket`.
 

@@ -1,4 +1,4 @@
-"""Rigorous light on lattices of infinite rows of circular cylinders, in a host slab between two half-spaces.
+"""Rigorous diffraction by stacked gratings of circular cylinders in a host slab between two half-spaces.
 
 The plane across the cylinders: x along a row, depth downwards from the front face; light travels in that
 plane. Within a row cylindrical harmonics are coupled by lattice sums; rows and faces exchange plane waves
@@ -37,7 +37,7 @@ _GRAZING = 1e-7  # of k: wavenumbers across the rows are kept this far from zero
 
 @dataclass(frozen=True)
 class Row:
-    """An infinite row of circular cylinders, one a pitch.
+    """Infinite row (grating) of circular cylinders, one per pitch.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Row:
 
 @dataclass(frozen=True)
 class CylinderGratings:
-    """Rows of cylinders in a host slab between a front and a back half-space.
+    """Stacked rows of cylinders in a host slab between a front and a back half-space.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class CylinderGratings:
 
 
 class Diffraction(NamedTuple):
-    """Light off and through a lattice, by diffraction order.
+    """Reflected and transmitted light of a lattice, by diffraction order.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ def diffract(
     lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike = 0.0,
     polarisation: Polarisation = "E", orders: int | None = None, harmonics: int | None = None,
 ) -> Diffraction:  # fmt: skip
-    """A plane wave from the front on a lattice.
+    """Diffraction of a plane wave from the front by a lattice of cylinders.
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def reflectance_spectrum(
     polarisation: Polarisation | Literal["unpolarised"] = "unpolarised",
     method: str = "rods",
 ) -> SlabPowers:  # fmt: skip
-    """Reflectance and transmittance of a lattice, all diffraction orders together.
+    """Reflectance and transmittance of a lattice of cylinders, summed over the diffraction orders.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rigorous light on parallel circular cylinders: cylindrical harmonics and multiple scattering.
+"""Rigorous scattering by parallel circular cylinders: cylindrical waves and multiple scattering.
 
 Everything lies in the plane across the cylinders, x and y; light travels in that plane. Polarisation
 ``"E"`` has the electric field along the cylinders, ``"H"`` the magnetic field; that field component is
@@ -81,7 +81,7 @@ class Cylinders:
 
 
 class Widths(NamedTuple):
-    """Power taken out of a beam over its irradiance: metres, (q,) for q angles of incidence."""
+    """Cross-sections per length (widths) of extinction, scattering and absorption, metres, (q,)."""
 
     extinction: FloatArray
     scattering: FloatArray
@@ -90,7 +90,7 @@ class Widths(NamedTuple):
 
 @dataclass(frozen=True)
 class Scattered:
-    """Waves around cylinders, of one wavelength.
+    """Waves scattered by cylinders at one wavelength.
 
     Attributes
     ----------
@@ -113,12 +113,12 @@ class Scattered:
 
     @property
     def wavenumber(self) -> float:
-        """In the host, 1/m."""
+        """Wavenumber in the host, 1/m."""
         return _wavenumber(self.cylinders, self.wavelength)
 
     @property
     def orders(self) -> Array:
-        """The orders -N to N."""
+        """Orders -N to N of the cylindrical waves."""
         half = self.outgoing.shape[-1] // 2
         return np.arange(-half, half + 1)
 
@@ -152,7 +152,7 @@ def scattering_coefficients(
 def efficiencies(
     radius: float, index: complex, host: float, wavelength: float, polarisation: Polarisation
 ) -> Widths:
-    """Efficiencies of one cylinder: extinction, scattering, absorption widths over its diameter.
+    """Efficiencies of one cylinder: extinction, scattering and absorption width over diameter.
 
     Arguments as in `scattering_coefficients`; Bohren and Huffman, eq. 8.36.
     """
@@ -167,7 +167,7 @@ def scatter(
     cylinders: Cylinders, wavelength: float, angle: ArrayLike = 0.0, polarisation: Polarisation = "E",
     orders: int | None = None,
 ) -> Scattered:  # fmt: skip
-    """Plane waves on a cluster of cylinders.
+    """Scattering of plane waves by a cluster of cylinders, with multiple scattering.
 
     Solved by elimination, or, where many centres lie on a rectangular grid (a lattice, staggered or not),
     by iteration with the coupling as a convolution.
@@ -213,7 +213,7 @@ def scatter(
 
 
 def amplitude(scattered: Scattered, direction: ArrayLike) -> ComplexArray:
-    """Scattering amplitude f: far off, u = sqrt(2 / (pi k r)) exp(i (k r - pi / 4)) f.
+    """Scattering amplitude f in the far field: u = sqrt(2 / (pi k r)) exp(i (k r - pi / 4)) f.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def differential_width(scattered: Scattered, direction: ArrayLike) -> FloatArray
 
 
 def widths(scattered: Scattered) -> Widths:
-    """Extinction, scattering and absorption widths, each found by itself, in metres.
+    """Extinction, scattering and absorption widths in metres, each computed independently.
 
     Extinction from the forward amplitude (optical theorem), scattering from the integral of the differential
     width, absorption from the power that flows into each cylinder; extinction is the sum of the two others.
@@ -264,7 +264,7 @@ def widths(scattered: Scattered) -> Widths:
 
 
 def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
-    """The wave u, incident and scattered, at points outside and inside the cylinders.
+    """Near field u, incident and scattered, at points outside and inside the cylinders.
 
     Parameters
     ----------

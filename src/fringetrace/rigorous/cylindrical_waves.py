@@ -1,4 +1,4 @@
-"""Cylindrical harmonics H_n(k r) exp(i n phi): one cylinder's answer, and what a row sends to itself."""
+"""Cylindrical waves H_n(k r) exp(i n phi): scattering by one cylinder, and lattice sums of a row."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _OVERFLOW = 600.0  # exponent beyond which the integrand is nothing
 
 
 def truncation(size_parameter: float) -> int:
-    """Highest order N that a cylinder of size parameter k a needs.
+    """Truncation order N of the cylindrical waves for a size parameter k a.
 
     W. J. Wiscombe's rule (Appl. Opt. 19, 1505 (1980)), with its constants raised until the first order left
     out is 1e-13 of the largest, for k a = 0.01 to 1000. Cylinders that almost touch may need more.
@@ -62,13 +62,13 @@ def checked_index(index: Any, what: str) -> ComplexArray:
 
 
 def indices_at(index: Index, wavelength: FloatArray) -> ComplexArray:
-    """Refractive index at each of some wavelengths in metres, complex128 of their shape."""
+    """Refractive index at wavelengths in metres, complex128 of their shape."""
     value = index(wavelength) if callable(index) else index
     return np.broadcast_to(checked_index(value, "Index"), wavelength.shape)
 
 
 def check_polarisation(polarisation: str) -> None:
-    """Raise ValueError unless the polarisation is "E" or "H"."""
+    """Check that the polarisation is "E" or "H"; else ValueError."""
     if polarisation not in ("E", "H"):
         raise ValueError(f"Polarisation: expected 'E' or 'H', got {polarisation!r}")
 
@@ -77,7 +77,7 @@ def boundary(
     radius: ArrayLike, index: ArrayLike, host: ArrayLike, wavelength: ArrayLike, polarisation: Polarisation,
     orders: int,
 ) -> tuple[Array, FloatArray, Array]:  # fmt: skip
-    """What the boundary of a cylinder does to each harmonic (Bohren and Huffman, 8.30 to 8.37).
+    """Boundary conditions of a cylinder for each order (Bohren and Huffman, 8.30 to 8.37).
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def damped(orders: Array, inner: ArrayLike, outer: complex) -> ComplexArray:
 
 
 def outgoing_waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
-    """H_l(k R) exp(i l phi) of orders -N to N at displacements (..., 2), zero at displacement zero."""
+    """Cylindrical waves H_l(k R) exp(i l phi), orders -N to N, at displacements (..., 2); 0 at R = 0."""
     distance = np.hypot(displacement[..., 0], displacement[..., 1])
     here = distance == 0.0
     azimuth = np.arctan2(displacement[..., 1], displacement[..., 0])
@@ -214,7 +214,7 @@ def outgoing_waves(displacement: FloatArray, k: float, orders: int) -> ComplexAr
 
 
 def lattice_sums(beta: ArrayLike, k: ArrayLike, pitch: float, orders: int) -> ComplexArray:
-    """Lattice sums of a row: the waves H_l(k R) exp(i l phi) at one cylinder from all the others in the row.
+    """Lattice sums of a row: cylindrical waves at one cylinder from all the others in the row.
 
     The cylinder at j d sends with the phase exp(i beta j d), and R, phi lead from it to the cylinder at 0.
 

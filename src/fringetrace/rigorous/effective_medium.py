@@ -1,4 +1,4 @@
-"""Effective media: a lattice blurred into flat layers, and what a stack of layers reflects."""
+"""Effective media: a lattice of cylinders as flat layers, and the reflectance of layer stacks."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ EXPONENT: dict[Polarisation, float] = {"E": 2.5, "H": -1.5}
 
 
 class SlabPowers(NamedTuple):
-    """Reflected and transmitted power over incident power, (...,) float64 each."""
+    """Reflected and transmitted over incident power, (...,) float64 each."""
 
     reflectance: FloatArray
     transmittance: FloatArray
 
 
 def effective_index(fraction: FloatArray, index: ComplexArray, polarisation: Polarisation) -> ComplexArray:
-    """Effective index of thin layers that hold cylinders: n_eff^w = sum of f n^w, w = 2.5 ("E"), -1.5 ("H").
+    """Effective index of thin layers with cylinders: n_eff^w = sum of f n^w, w = 2.5 ("E"), -1.5 ("H").
 
     A mean between those over n^2 and n^-2, as used for the feathers of peacocks; for the lattices tested,
     stacks of such layers peak within 6 % of the rigorous reflectance and 10 nm of its wavelength.
@@ -52,7 +52,7 @@ def stack_powers(
     thickness: ArrayLike, index: ArrayLike, front: ArrayLike, back: ArrayLike, wavelength: ArrayLike,
     angle: ArrayLike, polarisation: Polarisation,
 ) -> SlabPowers:  # fmt: skip
-    """Reflectance and transmittance of flat layers, see `films`, each of its own index at each wavelength.
+    """Reflectance and transmittance of flat layers, see `films`, with an index per wavelength.
 
     Parameters
     ----------

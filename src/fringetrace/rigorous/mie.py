@@ -1,4 +1,4 @@
-"""Rigorous light on one sphere: the Lorenz-Mie series (Bohren and Huffman, chapter 4)."""
+"""Mie scattering by one sphere: the Lorenz-Mie series (Bohren and Huffman, chapter 4)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fringetrace.rigorous.cylindrical_waves import LARGEST, checked_index, trunc
 
 
 class Efficiencies(NamedTuple):
-    """Cross-sections over pi a^2, and the mean cosine of the scattering angle."""
+    """Efficiencies (cross-sections over pi a^2), and the mean cosine of the scattering angle."""
 
     extinction: float
     scattering: float
@@ -89,7 +89,7 @@ def efficiencies(radius: float, index: complex, host: float, wavelength: float) 
 def amplitude_functions(
     radius: float, index: complex, host: float, wavelength: float, angle: ArrayLike
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Amplitudes S1 (across the scattering plane) and S2 (in it) at scattering angles.
+    """Scattering amplitudes S1 (across the scattering plane) and S2 (in it) at scattering angles.
 
     The differential cross-section is |S|^2 / k^2, k the wavenumber in the host.
 

@@ -1,4 +1,4 @@
-"""Spectra to colour: CIE illuminants and observers, XYZ, Lab, sRGB; measured spectra in and out."""
+"""Colorimetry: CIE illuminants and observers, spectrum to XYZ, Lab and sRGB; measured spectra as files."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _tabulated(name: str) -> tuple[FloatArray, FloatArray]:
 
 
 def illuminant(light: Illuminant, wavelengths: npt.ArrayLike) -> FloatArray:
-    """Relative spectral power of a lamp, 100 at 560 nm for those of the CIE, per wavelength.
+    """Relative spectral power of an illuminant; those of the CIE are 100 at 560 nm.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def _sums(samples: FloatArray, light: Illuminant | None, degrees: int) -> FloatA
 
 
 def weights(wavelengths: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
-    """Tristimulus weights: X, Y, Z of a reflectance are its samples times these.
+    """Tristimulus weights: X, Y, Z are the samples of a reflectance times these.
 
     The integral is a sum over the CIE's 5 nm and all samples together (trapezium rule); between its
     samples a reflectance is Lagrange's cubic (as in ASTM E2022), beyond them it keeps its last value
@@ -264,7 +264,7 @@ def _warn(values: FloatArray, samples: FloatArray, weights: FloatArray) -> None:
 def xyz(
     reflectance: npt.ArrayLike, wavelengths: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2
 ) -> FloatArray:
-    """Tristimulus values of reflectances (or transmittances): what reflects everything has Y = 1.
+    """CIE XYZ of reflectances (or transmittances); a perfect reflector has Y = 1.
 
     Of a BRDF in 1/sr give pi times it, for white is the Lambertian 1/pi. See `weights` for the integral.
 
@@ -306,12 +306,12 @@ def xyz(
 
 
 def white(illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
-    """XYZ of what reflects all of the light of a lamp: (3,) float64, with Y = 1."""
+    """CIE XYZ of the white point of an illuminant: (3,) float64, with Y = 1."""
     return np.asarray(weights(resolving_wavelengths(), illuminant, observer).sum(axis=0))
 
 
 def luminance(radiance: npt.ArrayLike, wavelengths: npt.ArrayLike, observer: int = 2) -> FloatArray:
-    """Luminance of a spectral radiance, absolute: 683 lm/W times the integral with y.
+    """Luminance of a spectral radiance in cd/m^2: 683 lm/W times its integral with y.
 
     Parameters
     ----------
@@ -330,7 +330,7 @@ def luminance(radiance: npt.ArrayLike, wavelengths: npt.ArrayLike, observer: int
 
 
 def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
-    """CIE x, y of X, Y, Z.
+    """CIE chromaticity x, y of X, Y, Z.
 
     Parameters
     ----------
@@ -347,7 +347,7 @@ def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
 
 
 def lab(xyz: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
-    """CIE 1976 L*a*b*.
+    """CIE 1976 L*a*b* of X, Y, Z.
 
     Parameters
     ----------
@@ -364,7 +364,7 @@ def lab(xyz: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2) -
 
 
 def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Illuminant = "D65") -> FloatArray:
-    """Colours on an sRGB screen (IEC 61966-2-1).
+    """Screen colours (sRGB, IEC 61966-2-1) of X, Y, Z, with a choice of gamut mapping.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Groups of coplanar facets that reflect one plane wave."""
+"""Groups of coplanar facets, each of which reflects one plane wave."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fringetrace.scene.model import Scene, Surface
 
 
 def group_facets(scene: Scene) -> list[npt.NDArray[np.int64]]:
-    """Which triangles of each surface are one: those in a plane, those that hang together on a form.
+    """Facet groups of each surface: facets of one plane, or connected facets on a form.
 
     Parameters
     ----------

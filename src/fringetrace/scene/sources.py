@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Gaussian beam profile, brightest at the centre: amplitude exp(-r^2 / waist^2).
+    """Gaussian beam profile: amplitude exp(-r^2 / waist^2).
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ Profile = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Names of surfaces, given as one or as several.
+    """Tuple of surface names, from one name or several.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def _checked_jones(value: Any) -> ComplexArray:
 
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """A collimated coherent beam: a plane wave, launched as a grid of parallel rays.
+    """Collimated coherent beam: a plane wave, launched as a grid of parallel rays.
 
     Parameters
     ----------
@@ -131,5 +131,5 @@ class Beam:
 
     @property
     def area(self) -> float:
-        """Area of the beam that one ray stands for, m^2."""
+        """Beam area per ray, m^2."""
         return self.size[0] * self.size[1] / (self.shape[0] * self.shape[1])

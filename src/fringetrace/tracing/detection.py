@@ -1,4 +1,4 @@
-"""Where paths land: on a CCD that they were not traced onto, or beside one; components of their field."""
+"""Detection of paths on a CCD that they were not traced onto; field components of paths."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
 
 
 def along(paths: Paths, axis: FloatArray) -> Paths:
-    """Paths whose amplitude is the field along an axis.
+    """Paths with the field component along an axis as their amplitude.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def along(paths: Paths, axis: FloatArray) -> Paths:
 
 
 def project(paths: Paths, ccd: CCD) -> Paths:
-    """Let the light that left a scene fall on a CCD beyond it, without a new trace.
+    """Detect the light that left a scene on a CCD beyond it, without a new trace.
 
     Parameters
     ----------

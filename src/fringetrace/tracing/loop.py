@@ -1,4 +1,4 @@
-"""The passes of a chunk of rays, until all its paths have ended: hit, interact, split, drop, again."""
+"""Tracing loop of a chunk of rays: hit, interact, split, drop, until all paths have ended."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """All that a chunk needs to know, the same for every thread.
+    """Settings of a trace, shared by all threads.
 
     `plain`: all surfaces reflect with -1, so that amplitudes follow from the number of bounces.
     `splits`: some surface sends light both ways, so that a ray may have many ends. `matter` is None where
@@ -46,18 +46,18 @@ class Plan:
 
     @property
     def total(self) -> int:
-        """How many rays there are."""
+        """Number of rays."""
         source = self.source
         return source.shape[0] * source.shape[1] if isinstance(source, Beam) else len(source)
 
     def rays(self, first: int, stop: int) -> Rays:
-        """Some of the rays."""
+        """Range of the rays."""
         source = self.source
         return launch(source, first, stop) if isinstance(source, Beam) else source.part(first, stop)
 
 
 class Record:
-    """Triangles and points of the paths of a chunk, by serial number: one column for each pass.
+    """Recorded triangles and points of a chunk's paths, by serial number: one column per pass.
 
     `left` is where light went on from those points; None where it did so from the points themselves.
     """
@@ -68,13 +68,13 @@ class Record:
         self.triangles: list[Array] = []
 
     def born(self, parents: Array) -> None:
-        """Paths that part from others in the pass that was added last."""
+        """Add paths that split off in the latest pass."""
         self.points = [np.concatenate([column, column[parents]]) for column in self.points]
         self.left = [c if c is None else np.concatenate([c, c[parents]]) for c in self.left]
         self.triangles = [np.concatenate([column, column[parents]]) for column in self.triangles]
 
     def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
-        """Append a pass: paths born in it inherit, those named by `serials` met a triangle."""
+        """Append a pass: new branches inherit, those named by `serials` met a triangle."""
         self.born(parents)
         total = len(self.points[0])
         met, where = np.full(total, -1, dtype=np.int64), np.full((total, 3), np.nan)
@@ -84,7 +84,7 @@ class Record:
         self.left.append(None)
 
     def displaced(self, serials: Array, point: FloatArray) -> None:
-        """Paths that go on from elsewhere than where they were in the pass that was added last."""
+        """Paths that continue from another point than their hit in the latest pass."""
         column = self.points[-1].copy() if self.left[-1] is None else self.left[-1]
         column[serials] = point
         self.left[-1] = column
@@ -92,7 +92,7 @@ class Record:
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A chunk of rays whose paths have all ended, as many as `rows`."""
+    """Ended paths of a chunk of rays, as many as `rows`."""
 
     ends: Ends
     rows: int
@@ -106,7 +106,7 @@ class Chunk:
 
 @dataclass(eq=False)
 class Workspace:
-    """Arrays that a thread keeps from chunk to chunk."""
+    """Arrays that a thread reuses from chunk to chunk."""
 
     state: Batch
     hits: Hits
@@ -116,7 +116,7 @@ class Workspace:
 
     @staticmethod
     def blank(plan: Plan, rows: int) -> Workspace:
-        """Room for so many rays, and for some branches of each where they split."""
+        """Uninitialised arrays for so many rays, and for their branches where they split."""
         from fringetrace.tracing.intersect.embree import Hits
 
         room = rows * (4 if plan.splits else 1)
@@ -143,7 +143,7 @@ def _noted(record: Record, plan: Plan, before: dict[str, Array], ends: Ends, old
 
 
 def nearest(plan: Plan, space: Workspace, count: int, passed: frozenset[int]) -> int:
-    """Nearest hits of the rays of a workspace, see `engine.find`; on the form where there is one.
+    """Find the nearest hits of the rays of a workspace, on exact forms where there are any.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def nearest(plan: Plan, space: Workspace, count: int, passed: frozenset[int]) ->
 
 
 def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
-    """Follow rays to all their ends.
+    """Trace rays to all their ends.
 
     Parameters
     ----------
@@ -230,7 +230,7 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
 
 
 def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
-    """The record of a chunk as the padded tables of `Paths`: surface, triangle, points, departures.
+    """Recorded paths of a chunk as padded tables of `Paths`: surface, triangle, points, departures.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
 
 
 def start(state: Batch, rays: Rays, first: int) -> None:
-    """Fill the head of a batch with rays at their start.
+    """Initialise a batch with rays at their start.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The passes of a chunk of rays through matter: arrive, meet boundaries and thin elements, leave."""
+"""Tracing loop of a chunk of rays through matter: arrive, meet boundaries and elements, leave."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class _State:
 
 
 def traverse(plan: Plan, space: Workspace, first: int, stop: int) -> Chunk:
-    """Follow rays through matter to all their ends.
+    """Trace rays through matter to all their ends.
 
     Parameters
     ----------

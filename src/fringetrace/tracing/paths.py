@@ -1,4 +1,4 @@
-"""What came out of a trace: where each path ended and why, its optical path, and the power ledger."""
+"""Traced paths: ends and fates, optical path lengths, amplitudes, and the power ledger."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fringetrace.tracing.rays import Rays
 
 @dataclass(frozen=True)
 class Ledger:
-    """Where the power went, in units of |amplitude|^2 * m^2 (or of rays, where they have no area).
+    """Power ledger: incident power by fate, in |amplitude|^2 * m^2 (or rays, where they have no area).
 
     `truncated` is what was cut off by the number of bounces or by the least amplitude, and branches
     that were not to be followed.
@@ -32,7 +32,7 @@ class Ledger:
 
     @property
     def error(self) -> float:
-        """Power unaccounted for, relative to the incident power."""
+        """Unaccounted power, relative to the incident power."""
         total = self.detected + self.left + self.absorbed + self.truncated
         return abs(total - self.incident) / self.incident if self.incident else abs(total)
 
@@ -44,7 +44,7 @@ class Ledger:
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """One row for each end of a path, sorted by ray; a ray that splits has several.
+    """Traced paths: one row per end, sorted by ray; a ray that splits has several.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class Paths:
         return len(self.ray)
 
     def where(self, mask: Array) -> Paths:
-        """Some of the paths.
+        """Subset of the paths.
 
         Parameters
         ----------
@@ -159,13 +159,13 @@ class Paths:
 
     @cached_property
     def detected(self) -> Paths:
-        """The paths that reached the CCD."""
+        """Paths that reached the CCD."""
         seen = self.fate == Fate.DETECTED
         return self if seen.all() else self.where(seen)
 
     @cached_property
     def pixel(self) -> FloatArray:
-        """(m, 2) float64: CCD coordinates (row, column) in pixels; NaN where not detected.
+        """CCD coordinates (row, column) in pixels, (m, 2) float64; NaN where not detected.
 
         Pixel [i, j] spans [i, i+1) x [j, j+1).
         """
@@ -178,18 +178,18 @@ class Paths:
 
     @property
     def starts(self) -> FloatArray | None:
-        """(m, b + 1, 3) float64, metres: where each segment starts, if recorded; padded with NaN."""
+        """Start points of segments, if recorded, (m, b + 1, 3) float64, metres; padded with NaN."""
         if self.departures is not None or self.points is None:
             return self.departures
         return self.points[:, :-1]
 
     @property
     def gradient(self) -> FloatArray:
-        """(m, 3) float64: gradient of the optical path where each path ended, index times direction."""
+        """Gradient of the optical path at each end, index times direction, (m, 3) float64."""
         return self.direction if self.index is None else self.index[:, None] * self.direction
 
     def sequence(self, row: int) -> list[tuple[int, bool]]:
-        """Surfaces that a path met and whether it went through them (decoded from its key).
+        """Surfaces that a path met, and whether it was transmitted (decoded from its key).
 
         Parameters
         ----------
@@ -211,7 +211,7 @@ class Paths:
         return [self.scene.digits[int(d) - 1] for d in digits]
 
     def visits(self, surface: int) -> npt.NDArray[np.int64]:
-        """How often each path met a surface.
+        """Number of times each path met a surface.
 
         Parameters
         ----------
@@ -234,7 +234,7 @@ class Paths:
         return np.asarray(np.isin(digits, mine).sum(axis=1)[which], dtype=np.int64)
 
     def kinds(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """The sequences among the paths (decoded from their keys), and which of them each path took.
+        """Surface sequences among the paths (decoded from their keys), and which each path took.
 
         Returns
         -------
@@ -278,7 +278,7 @@ class Paths:
         return digits
 
     def polyline(self, row: int) -> FloatArray:
-        """The points that a path went through.
+        """Points of a path.
 
         Parameters
         ----------
@@ -308,7 +308,7 @@ class Paths:
         return np.asarray(points[np.isfinite(points[:, 0])], dtype=np.float64)
 
     def ledger(self) -> Ledger:
-        """Power by fate; adds up to the incident power for the paths of a whole trace.
+        """Power ledger by fate; it adds up to the incident power for all paths of a trace.
 
         Returns
         -------

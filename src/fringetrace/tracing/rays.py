@@ -1,4 +1,4 @@
-"""The batch of rays, a struct of arrays; launching one from a beam."""
+"""Rays: origins, directions, amplitudes; launch from a beam."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _rows_of_three(value: npt.ArrayLike, what: str) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays to be traced.
+    """Rays to trace: origins, directions, optical path lengths, amplitudes.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class Rays:
         return len(self.origin)
 
     def part(self, start: int, stop: int) -> Rays:
-        """The rays from `start` up to `stop`.
+        """Rays from `start` up to `stop`.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ def _field(beam: Beam, count: int) -> ComplexArray | None:
 
 
 def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
-    """Rays of a beam, from the centres of its grid cells, row by row.
+    """Launch rays of a beam from the centres of its grid cells, row by row.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
 
 
 def launch_at(beam: Beam, column: FloatArray, row: FloatArray) -> Rays:
-    """Rays of a beam from anywhere on its rectangle, all of amplitude 1.
+    """Launch rays of a beam from any points of its rectangle, with amplitude 1.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ DRIFT = 10.0
 
 
 def at_wavelength(paths: Paths, wavelength: float) -> Paths:
-    """Paths as another wavelength takes them, without a new trace.
+    """Paths at another wavelength, without a new trace.
 
     Optical paths follow from the way in each medium, amplitudes of boundaries met straight on from the
     key: wherever nothing is bent by another angle.

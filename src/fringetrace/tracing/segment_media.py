@@ -1,4 +1,4 @@
-"""Paths leg by leg: the media they go through, optical path and phase from point to point."""
+"""Media, optical path and phase of each segment of recorded paths."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fringetrace.tracing.paths import Paths
 
 
 def ways(paths: Paths) -> FloatArray:
-    """Length of each leg; negative back from the last hit to the CCD's plane of focus.
+    """Length of each segment; negative from the last hit back to the CCD's plane of focus.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def ways(paths: Paths) -> FloatArray:
 
 
 def media(paths: Paths) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
-    """Whether light went on through each surface, and what it is in on each leg.
+    """Transmission at each hit, and medium of each segment.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def _spread(paths: Paths, sums: FloatArray, total: FloatArray) -> FloatArray:
 
 
 def opl(paths: Paths, way: FloatArray, medium: Array, wavelength: float | None) -> FloatArray:
-    """Optical path from the start to each point.
+    """Optical path length from the start to each point.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def opl(paths: Paths, way: FloatArray, medium: Array, wavelength: float | None) 
 
 
 def turned(paths: Paths, through: Array) -> FloatArray:
-    """By how much surfaces turned the phase up to each point.
+    """Phase added by surfaces up to each point.
 
     Parameters
     ----------

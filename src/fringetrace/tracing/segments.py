@@ -1,4 +1,4 @@
-"""What recorded paths met: how far each hit is from where it belongs, and what that does to the path."""
+"""Segments of recorded paths: directions, lengths, indices, normals at hits."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EXTENDED = np.longdouble
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """Bounces of some paths on one surface: the path and bounce of each, its point (n, 3) and face (n,)."""
+    """Hits of some paths on one surface: path and bounce of each, its point (n, 3) and face (n,)."""
 
     surface: Surface
     fit: Fit | None
@@ -31,14 +31,14 @@ class Met:
 
     @property
     def formed(self) -> npt.NDArray[np.bool_]:
-        """(n,) bool: on faces that have a form."""
+        """Whether each hit is on a face with an exact form, (n,) bool."""
         if self.fit is None:
             return np.zeros(len(self.face), dtype=np.bool_)
         return np.asarray(self.fit.along[self.face] != 0)
 
 
 def met(paths: Paths) -> Iterator[Met]:
-    """Bounces of recorded paths, surface by surface.
+    """Hits of recorded paths, surface by surface.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def met(paths: Paths) -> Iterator[Met]:
 
 
 def legs(paths: Paths) -> tuple[Array, Array]:
-    """Segments of recorded paths, from the recorded points alone.
+    """Segments of recorded paths, computed from the recorded points alone.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def legs(paths: Paths) -> tuple[Array, Array]:
 
 
 def indices(paths: Paths) -> FloatArray:
-    """Real refractive index on each segment of recorded paths.
+    """Real refractive index of each segment of recorded paths.
 
     Parameters
     ----------
@@ -153,13 +153,13 @@ def _slanting(medium: ComplexArray, normal: FloatArray, direction: FloatArray) -
 
 
 def facing(bounces: Met) -> FloatArray:
-    """Normal (n, 3) of the facet at each bounce, towards the front."""
+    """Facet normal (n, 3) at each hit, towards the front."""
     corner = corners(bounces)
     return unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
 
 
 def corners(bounces: Met) -> FloatArray:
-    """Corners (n, 3, 3) of the facets met, first those of the shortest side: good for normals of needles."""
+    """Corners (n, 3, 3) of the facets hit, those of the shortest side first (accurate for needles)."""
     corners = bounces.surface.mesh.vertices[bounces.surface.mesh.faces[bounces.face]]
     sides = ((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2)
     order = (np.argmin(sides, axis=1)[:, None] + np.arange(3)) % 3
@@ -167,7 +167,7 @@ def corners(bounces: Met) -> FloatArray:
 
 
 def normals(bounces: Met) -> FloatArray:
-    """Normal of the surface at each bounce, of either sense.
+    """Surface normal at each hit, of either sign.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def normals(bounces: Met) -> FloatArray:
 
 
 def level(bounces: Met, on: Array, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Level function of the form at some bounces, its gradient, its second derivative along directions."""
+    """Level function of the form at hits, its gradient, its second derivative along directions."""
     fit, point = bounces.fit, bounces.point[on]
     if isinstance(fit, LevelFit):
         return fit.form.level(point, direction)

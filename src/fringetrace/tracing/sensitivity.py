@@ -10,7 +10,7 @@ from fringetrace.tracing.segments import EXTENDED, Met, facing, indices
 
 
 def shifted(paths: Paths, bounces: Met, offset: Array, turn: Array) -> Array:
-    """What it does to the path that a surface stands somewhere else: -(n' d_out - n d_in) . offset.
+    """Change of the optical path due to a surface offset: -(n' d_out - n d_in) . offset.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def shifted(paths: Paths, bounces: Met, offset: Array, turn: Array) -> Array:
 
 
 def leverage(bounces: Met, direction: FloatArray, index: FloatArray) -> FloatArray:
-    """How far rays turn at each bounce where the surface turns by 1: 2 off a mirror.
+    """Change of ray direction per unit rotation of the surface at each hit: 2 off a mirror.
 
     From Snell's law, n' d' = n d + (n' c' - n c) nu, with cosines c to the normal nu.
 

@@ -1,4 +1,4 @@
-"""A beam or rays through a scene: chunk by chunk, on a thread pool."""
+"""Ray tracer: a beam or rays through a scene, chunk by chunk on a thread pool."""
 
 from __future__ import annotations
 
@@ -263,7 +263,7 @@ def stream(
     chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Paths]:
-    """Trace in chunks that need not fit into memory together; arguments as for `trace`.
+    """Trace in chunks, which need not fit into memory together; arguments as for `trace`.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def trace(
     chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Paths:
-    """Follow rays through a scene until they are detected, leave, or are cut off.
+    """Trace rays through a scene until they are detected, leave, or are cut off.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""From the sheets of coherent beams to the light on the pixels."""
+"""Assembly of a beam's wavefronts into mean fields and mutual intensities on the pixels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Numbers = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """What a beam brings to a CCD.
+    """Wavefronts of a beam on a CCD: plane waves, curved patches, edges.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Light:
 def light(
     paths: Paths, groups: Numbers, half_wave_loss: bool = True, axis: FloatArray | None = None
 ) -> Light:
-    """Plane waves and curved sheets of a beam.
+    """Reconstruct the wavefronts of a beam: plane waves off facets, curved patches off forms.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def light(
 def fields(
     lights: list[Light], groups: int, shape: tuple[int, int], period: float, carrier: bool, more: int = 0
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Means over each pixel of the fields of groups of sheets, and of their products.
+    """Means over each pixel of the fields of groups of wavefronts, and of their products.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sheets off flat facets: a plane wave for each sequence of facets, and its region of the beam."""
+"""Plane waves off sequences of flat facets, and their regions of the beam."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from fringetrace.tracing import Paths, indices, landed
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """A plane wave off a sequence of facets.
+    """Plane wave off a sequence of facets.
 
     Attributes
     ----------
@@ -47,13 +47,13 @@ class Wave:
     amplitude: complex
 
     def to_pixels(self, at: FloatArray) -> FloatArray:
-        """Points (..., 2) of the beam's grid on the CCD."""
+        """CCD coordinates of points (..., 2) of the beam's grid."""
         return np.asarray(self.origin + (at - self.start) @ self.matrix.T, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where on the beam's grid a wave starts: cells from `low` on, and pieces of cells, see `raster`.
+    """Region of the beam's grid where a wave starts: cells from `low` on, and pieces of cells.
 
     `segments` are the region's edges on the beam's grid, (n, 2, 2).
     """
@@ -133,7 +133,7 @@ def _near(wave: Wave, row: Array, column: Array, ccd: CCD) -> npt.NDArray[np.boo
 
 
 def plane_waves_of(survey: Survey) -> Iterator[tuple[Wave, Region]]:
-    """Plane waves on a CCD off the facets of a scene, and the regions of the beam they come from.
+    """Plane waves on a CCD off the facets of a scene, and their regions of the beam.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def add_plane_wave(
     wave: Wave, region: Region, beam: Beam, period: float, points: Samples, field: ComplexArray,
     slope: FloatArray,
 ) -> None:  # fmt: skip
-    """Add a plane wave to sample points; exact but for rounding.
+    """Add a plane wave to sample points, exact but for rounding.
 
     Parameters
     ----------

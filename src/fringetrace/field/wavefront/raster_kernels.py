@@ -1,4 +1,4 @@
-"""Fused float64 passes from sheets of arrivals to sample points on the pixels, compiled by numba.
+"""Compiled rasterisation of wavefront patches onto sample points of the pixels.
 
 A sheet maps grid coordinates (s along columns, t along rows) to CCD coordinates in pixels. A cell of
 a curved sheet has the fields X, Y, W, J, and the two parts of the amplitude, each as the 4 x 4
@@ -29,7 +29,7 @@ NUDGE_S, NUDGE_T = 1.2345e-9, 2.7183e-9
 
 @part
 def patch(cells, cell, f, s, t):
-    """Value of field f of a cell and its derivatives along s and t."""
+    """Value of field f of a cell, with derivatives along s and t."""
     value, along_s, along_t = 0.0, 0.0, 0.0
     for i in range(3, -1, -1):
         c0, c1 = cells[cell, f, i, 0], cells[cell, f, i, 1]
@@ -55,7 +55,7 @@ def scalar(cells, cell, f, s, t):
 
 @jit
 def survey(cells, cell, s0, s1, t0, t1):
-    """Least and largest J, and the box, of part of a cell: of 5 x 5 probes, the box with a margin."""
+    """Range of J and bounding box over part of a cell, from 5 x 5 points, the box with a margin."""
     least, most = np.inf, -np.inf
     left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
     for i in range(5):
@@ -71,7 +71,7 @@ def survey(cells, cell, s0, s1, t0, t1):
 
 @jit
 def split_cells(cells, domain, lines, rows, columns):
-    """Leaves of cells, from their domains (s from and to, t from and to) and lines (a, b, c).
+    """Quadtree leaves of cells, from their domains (s from and to, t from and to) and chords (a, b, c).
 
     Those that no pixel sees are left out.
     """
@@ -122,7 +122,7 @@ CLOSE = 1e-4
 
 @part
 def newton(px, py, xs, xt, ys, yt, area, x, y, wide, tall):
-    """Newton's step to (x, y) from a point of the map, of 3/4 leaf at most, and its full length in leaves."""
+    """Newton step to (x, y) from a point of the map, limited to 3/4 leaf, and its full length in leaves."""
     dx, dy = x - px, y - py
     ds, dt = (yt * dx - xt * dy) / area, (xs * dy - ys * dx) / area
     stretch = max(abs(ds) / wide, abs(dt) / tall)
@@ -133,7 +133,7 @@ def newton(px, py, xs, xt, ys, yt, area, x, y, wide, tall):
 
 @part
 def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
-    """Where in a regular leaf the map meets (x, y), from (s, t) on: found, s, t and the Jacobian there."""
+    """Root (s, t) of the map at (x, y) in a regular leaf: found, s, t and the Jacobian there."""
     wide, tall = s1 - s0, t1 - t0
     area = 0.0
     for _ in range(12):
@@ -155,7 +155,7 @@ def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
 
 @part
 def plain(cells, cell, s, t, area, unit, period):
-    """The wave of one branch: amplitude, spread over |area|, and path."""
+    """Wave of one branch: amplitude, spread over |area|, and path."""
     way = scalar(cells, cell, 2, s, t)
     amplitude = complex(scalar(cells, cell, 4, s, t), scalar(cells, cell, 5, s, t))
     turn = 2.0 * np.pi * ((way % period) / period)
@@ -174,7 +174,7 @@ def gradient(cells, cell, s, t):
 
 @jit
 def add_leaves(leaves, cells, folded, turns, unit, period, top, columns, first, x, y, field, slope):
-    """Add the waves of regular leaves to the sample points of a band of pixels that begins at row `top`.
+    """Add the waves of regular leaves to the sample points of a band of pixels from row `top` on.
 
     `folded` marks cells in which J changes its sign, `turns` has their caustics passed where J < 0
     and where J > 0, `unit` is the beam area of a cell in pixels. `slope` (lowest and highest of both
@@ -210,7 +210,7 @@ def add_leaves(leaves, cells, folded, turns, unit, period, top, columns, first, 
 
 @part
 def widen(slope, across, up):
-    """Let a range take in one more gradient."""
+    """Extend a range by one gradient."""
     slope[0], slope[1] = min(slope[0], across), max(slope[1], across)
     slope[2], slope[3] = min(slope[2], up), max(slope[3], up)
 

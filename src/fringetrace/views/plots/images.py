@@ -1,4 +1,4 @@
-"""Pictures with real units: interferograms, heights, residuals, phases; scenes come from `drawing`."""
+"""Image plots with real units: interferograms, heights, residuals, phases."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
 
 
 def side_by_side() -> tuple[Axes, Axes]:
-    """Two axes side by side in a figure of their own, with room for a colour bar beside each.
+    """Two axes side by side in a new figure, with space for colour bars.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def interferogram(
     wavelength: float | None = None,
     title: str | None = None,
 ) -> Axes:
-    """An interferogram in grey.
+    """Plot an interferogram in grey, with scale bar and colour bar.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def interferogram(
 
 
 def height(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str | None = None) -> Axes:
-    """A height map, in nm, µm or mm; NaN is light grey.
+    """Plot a height map in nm, um or mm; NaN is light grey.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ def residual(
     wavelength: float | None = None,
     title: str | None = None,
 ) -> Axes:
-    """A difference of heights, its scale the same on both sides of 0; its rms in the title.
+    """Plot a height residual, symmetric about 0, with its rms in the title.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def residual(
 
 
 def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str | None = None) -> Axes:
-    """A wrapped phase in cyclic colours, which meet at -pi and pi.
+    """Plot a wrapped phase in a cyclic colour map.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str |
 
 
 def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> None:
-    """Write a figure, or the figure of some axes; a file is there in full or not at all.
+    """Save a figure, or the figure of some axes, atomically.
 
     Parameters
     ----------
