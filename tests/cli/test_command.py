@@ -333,7 +333,7 @@ def test_a_failure_on_the_way_leaves_nothing_half_written(command, sample, tmp_p
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fringetrace.validation.measurement.write_netcdf", full)
+    monkeypatch.setattr("fringetrace.validation.measurement.write_measurement", full)
     code, _, errors = command("interferogram", sample, "--unit", "mm", "--out", tmp_path / "out", *QUICK)
     assert code == 2
     assert "No space left on device" in errors
