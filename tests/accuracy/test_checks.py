@@ -138,7 +138,7 @@ def test_an_image_may_have_dark_parts():
 def test_what_one_wave_lacks_another_does_not_hide():
     paths = spread_light(36)
     full = spread_light(80)
-    both = ft.paths.join([replace(paths, area=None), replace(full, key=full.key + np.uint64(1), area=None)])
+    both = ft.tracing.join([replace(paths, area=None), replace(full, key=full.key + np.uint64(1), area=None)])
     assert "pixels starve" in checks.starvation(both)
 
 

@@ -61,7 +61,7 @@ def test_the_axis_of_the_light_hits_the_coating_in_the_origin():
     shift = 2e-3 * math.sin(math.pi / 4 - r) / math.cos(r)
     assert (abs(z), abs(x)) == (pytest.approx(shift, rel=1e-12), pytest.approx(shift, rel=1e-12))
     bench = instruments.michelson(
-        instruments.plate(40e-3, 40e-3), aperture=5e-3, pixels=(3, 3), splitter=SplitterPlate(2e-3, 1.515)
+        plate(40e-3, 40e-3), aperture=5e-3, pixels=(3, 3), splitter=SplitterPlate(2e-3, 1.515)
     )
     seen = bench.sampled((3, 3), 550 * nm)
     middle = [

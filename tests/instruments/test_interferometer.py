@@ -114,9 +114,7 @@ def test_a_height_needs_light_from_both_arms():
     beside = plate(1 * mm, 1 * mm).moved((10 * mm, 0.0, 0.0))
     dark = instruments.michelson(beside, aperture=6 * mm, pixels=(6, 8))
     assert np.isnan(dark.wrapped(HENE)).all()
-    with pytest.raises(
-        ValueError, match="path difference: expected pixels with light from both arms"
-    ):
+    with pytest.raises(ValueError, match="path difference: expected pixels with light from both arms"):
         dark.height(HENE)
 
 
@@ -193,9 +191,7 @@ def test_light_of_a_shut_arm_ends_at_the_shutter(bench):
         assert ended.sum() == np.prod(bench.beam.shape)
         assert len(paths) < len(bench.trace())
         assert len(bench.shut(arm).trace().detected) == np.prod(bench.beam.shape)
-    with pytest.raises(
-        ValueError, match="path difference: expected pixels with light from both arms"
-    ):
+    with pytest.raises(ValueError, match="path difference: expected pixels with light from both arms"):
         bench.shut("reference").height(HENE)
 
 

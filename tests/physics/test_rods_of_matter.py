@@ -8,7 +8,7 @@ import pytest
 from rods import FEATHERS, feather, keratin, melanin
 
 from fringetrace import nm
-from fringetrace.rigorous import ray_validity
+from fringetrace.rigorous import validity
 from fringetrace.rigorous.cylinder_gratings import reflectance_spectrum
 from fringetrace.rigorous.cylinders import Cylinders, amplitude, differential_width, scatter
 from fringetrace.rigorous.cylindrical_waves import CONDUCTOR
@@ -143,7 +143,7 @@ def test_rays_against_the_exact_wave(direction, percent):
             assert abs(exact - (-3.487641 + 9.148322j)) < 1e-6
         error = abs(discs.amplitude(found, 2 * math.pi / wavelength) / exact - 1)
         assert 100 * error == pytest.approx(expected, abs=0.051)
-        assert error < ray_validity(5, wavelength, CONDUCTOR).ray_error
+        assert error < validity(5, wavelength, CONDUCTOR).ray_error
 
 
 @pytest.mark.parametrize("size", [100.0, 1000.0])

@@ -95,7 +95,7 @@ def test_tilt_fringes_are_averaged_over_the_pixel(tilt, pitch, visibility):
     flat, leaning = (
         arrivals.reflected(beam, ccd, arrivals.plane(angle), key) for key, angle in ((1, 0.0), (2, tilt))
     )
-    image = ft.irradiance(ft.paths.join([flat, leaning]), HENE)
+    image = ft.irradiance(ft.tracing.join([flat, leaning]), HENE)
     x = (np.arange(96) - 47.5) * pitch
     # both paths through the origin of both mirrors: .1 + .05 cos 2a + x sin 2a, against .15
     apart = 0.05 * (math.cos(2 * tilt) - 1) + x * math.sin(2 * tilt)

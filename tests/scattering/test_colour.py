@@ -157,8 +157,8 @@ def test_an_unknown_gamut_or_path_is_refused():
 def test_the_library_leaves_no_traces():
     # colour-science changes how numpy prints when it is imported, and may warn
     code = (
-        "import numpy, warnings; from fringetrace import spectra;"
-        "old = numpy.get_printoptions(), warnings.filters[:]; spectra.white();"
+        "import numpy, warnings; from fringetrace import colour;"
+        "old = numpy.get_printoptions(), warnings.filters[:]; colour.white();"
         "assert old == (numpy.get_printoptions(), warnings.filters[:])"
     )
     run = subprocess.run(

@@ -10,8 +10,9 @@ from hypothesis import Phase, given, settings, strategies as st
 import fringetrace as ft
 from fringetrace import instruments, mm, nm
 from fringetrace.core.vectors import rotation
-from fringetrace.field.wavefront import boundary_search, plane_waves, probe, visibility
+from fringetrace.field.wavefront import boundary_search, plane_waves, visibility
 from fringetrace.geometry import shapes
+from fringetrace.scene import facet_groups
 from fringetrace.tracing.rays import launch, launch_at
 
 HENE = 632.8 * nm
@@ -33,7 +34,7 @@ def flux(paths):
 
 def test_triangles_of_one_plane_have_one_number():
     mesh = shapes.staircase(3 * mm, 2 * mm, 3, 70 * nm).moved((1e-3, 0, 2e-3), rotation((1, 2, 3), 0.7))
-    (planes,) = probe.parted(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
+    (planes,) = facet_groups.group_facets(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
     assert (planes[::2] == planes[1::2]).all()
     assert len(np.unique(planes)) == 5
 

@@ -75,7 +75,7 @@ def page_text(view: View, title: str) -> str:
         "plotly": get_plotlyjs(),
         "data": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
     }
-    template = files("fringetrace").joinpath("page.html").read_text(encoding="utf-8")
+    template = files("fringetrace.views.scene3d").joinpath("page.html").read_text(encoding="utf-8")
     return Template(template).substitute(parts)
 
 
