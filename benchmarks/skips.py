@@ -294,7 +294,7 @@ def differences(side: int) -> Skip:
         image,
         "fringes",
         lambda real: lambda slope, _: real(slope, True),
-        *(f"field.{file}" for file in files),
+        *files,
     )
     return Skip("irradiance: sampled for fringes, not for the carrier", "tilted flats", image, carrier)
 
