@@ -135,6 +135,27 @@ def unwrap(phase: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArra
     return result
 
 
+def optical_path(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
+    """Optical path difference of a phase difference: phase * wavelength / (2 pi).
+
+    Parameters
+    ----------
+    phase : float64, radians, any shape
+    wavelength : float, metres
+
+    Returns
+    -------
+    float64, metres, shape of `phase`
+
+    Raises
+    ------
+    ValueError
+        If the wavelength is not a positive length.
+    """
+    scale = checked_wavelength(wavelength) / (2.0 * math.pi)
+    return np.asarray(filled(phase) * scale, dtype=np.float64)
+
+
 def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
     """Height of a reflecting surface from its phase, phase * wavelength / (4 pi), towards the light.
 
@@ -153,8 +174,7 @@ def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
     ValueError
         If the wavelength is not a positive length.
     """
-    scale = checked_wavelength(wavelength) / (4.0 * math.pi)
-    return np.asarray(filled(phase) * scale, dtype=np.float64)
+    return np.asarray(0.5 * optical_path(phase, wavelength), dtype=np.float64)
 
 
 def synthetic_wavelength(wavelength1: float, wavelength2: float) -> float:
