@@ -1,1 +1,1 @@
-from . import assemble as assemble
+from .wavefronts import Wavefronts as Wavefronts, reconstruct as reconstruct
