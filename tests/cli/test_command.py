@@ -314,7 +314,7 @@ def test_an_error_is_one_clear_line_and_leaves_nothing(case, command, tmp_path, 
 
 
 def test_an_error_is_found_before_anything_is_traced(command, sample, tmp_path, monkeypatch):
-    monkeypatch.setattr("fringetrace.tracing.tracer.trace", lambda *args, **options: pytest.fail("traced"))
+    monkeypatch.setattr("fringetrace.instruments.rig.trace", lambda *args, **options: pytest.fail("traced"))
     (tmp_path / "out").write_text("")
     for options in (["--out", tmp_path / "out"], ["--steps", "2"], ["--wavelength", "0 nm"]):
         assert command("interferogram", sample, "--unit", "mm", *options)[0] == 2
@@ -344,7 +344,7 @@ def test_an_interrupt_ends_it_quietly(command, sample, tmp_path, monkeypatch):
     def interrupted(*args, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fringetrace.tracing.tracer.trace", interrupted)
+    monkeypatch.setattr("fringetrace.instruments.rig.trace", interrupted)
     out = tmp_path / "out"
     assert command("interferogram", sample, "--unit", "mm", "--out", out, *QUICK)[::2] == (130, "")
     assert not out.exists()

@@ -12,6 +12,7 @@ from fringetrace.field.pixel_quadrature import Case
 # Phases of some turns are known to a few roundings.
 ROUNDING = 1e-13
 SHAPE = (12, 16)
+ONE = (Case(1.0),)
 
 
 class Light:
@@ -29,11 +30,11 @@ class Light:
         return self.fields(points, slope, case.wavelength), slope
 
 
-def mean_field(light, cuts=None, cases=(Case(1.0),)):
+def mean_field(light, cuts=None, cases=ONE):
     return pixel_quadrature.averaged(SHAPE, light, cases, True, cuts)[0]
 
 
-def mutual_intensity(light, cuts=None, cases=(Case(1.0),)):
+def mutual_intensity(light, cuts=None, cases=ONE):
     return pixel_quadrature.averaged(SHAPE, light, cases, False, cuts)[0]
 
 

@@ -149,8 +149,8 @@ def test_stokes_relations(first, last, angle):
     if sine2.real > (0.999 * last) ** 2:  # total reflection: there is no wave to send back
         return
     none, nothing = np.empty(0, np.complex128), np.empty(0)
-    there = film_kernels.stack(sine2, complex(first), none, nothing, complex(last), 1.0)
-    back = film_kernels.stack(sine2, complex(last), none, nothing, complex(first), 1.0)
+    there = film_kernels.stack_amplitudes(sine2, complex(first), none, nothing, complex(last), 1.0)
+    back = film_kernels.stack_amplitudes(sine2, complex(last), none, nothing, complex(first), 1.0)
     for part in (0, 1):
         # kz of each side is off by the rounding of n^2 - sine2
         worst = 20 * EPS * max(first**2 / abs(first**2 - sine2), last**2 / abs(last**2 - sine2))

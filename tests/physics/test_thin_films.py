@@ -11,7 +11,7 @@ from hypothesis import given, settings, strategies as st
 from fringetrace import nm
 from fringetrace.core.units import degree
 from fringetrace.optics import films, materials
-from fringetrace.optics.film_kernels import stack
+from fringetrace.optics.film_kernels import stack_amplitudes
 from fringetrace.optics.films import Film
 
 EPS = float(np.finfo(np.float64).eps)
@@ -178,8 +178,10 @@ def test_light_sent_back_meets_the_incident_wave():
     film = Film([(2.3, 70 * nm), (1.38, 110 * nm), (1.8, 40 * nm)])
     sine2 = complex(0.6**2)
     n, d = film.indices(550 * nm), film.thickness
-    there = stack(sine2, 1 + 0j, n, d, 1.52 + 0j, 2 * math.pi / (550 * nm))
-    back = stack(sine2, 1.52 + 0j, n[::-1].copy(), d[::-1].copy(), 1 + 0j, 2 * math.pi / (550 * nm))
+    there = stack_amplitudes(sine2, 1 + 0j, n, d, 1.52 + 0j, 2 * math.pi / (550 * nm))
+    back = stack_amplitudes(
+        sine2, 1.52 + 0j, n[::-1].copy(), d[::-1].copy(), 1 + 0j, 2 * math.pi / (550 * nm)
+    )
     for part in (0, 1):
         r, t, behind = there[part], there[2 + part], back[part]
         assert abs(r.conjugate() * t + t.conjugate() * behind) < 20 * EPS
@@ -190,7 +192,7 @@ def test_a_layer_at_its_critical_angle():
     film = Film([(1.5, 80 * nm)])
     n, d, k0 = film.indices(550 * nm), film.thickness, 2 * math.pi / (550 * nm)
     at, below, above = (
-        np.array(stack(complex(2.25 * (1 + shift)), 2 + 0j, n, d, 1.8 + 0j, k0))
+        np.array(stack_amplitudes(complex(2.25 * (1 + shift)), 2 + 0j, n, d, 1.8 + 0j, k0))
         for shift in (0.0, -1e-6, 1e-6)
     )
     assert np.isfinite(at).all()

@@ -6,11 +6,11 @@ import pytest
 from fringetrace.rigorous.cylinders import (
     Cylinders,
     amplitude,
-    coefficients,
     differential_width,
     efficiencies,
     near_field,
     scatter,
+    scattering_coefficients,
     widths,
 )
 from fringetrace.rigorous.cylindrical_waves import CONDUCTOR
@@ -48,7 +48,7 @@ def test_efficiencies_of_an_absorbing_cylinder():
 
 
 def test_coefficients_broadcast_and_conserve_power():
-    found = coefficients([0.1, 0.4], np.array([1.5, 3.0]), 1.2, 0.7, "H", 4)
+    found = scattering_coefficients([0.1, 0.4], np.array([1.5, 3.0]), 1.2, 0.7, "H", 4)
     assert found.shape == (2, 9)
     np.testing.assert_allclose(abs(1 + 2 * found), 1, rtol=BALANCE)
 

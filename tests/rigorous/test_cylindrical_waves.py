@@ -4,12 +4,12 @@ from scipy.special import h1vp, hankel1, jv, jvp
 
 from fringetrace.rigorous.cylindrical_waves import (
     CONDUCTOR,
-    at_wavelength,
     boundary,
     hankel,
+    indices_at,
     lattice_sums,
+    outgoing_waves,
     truncation,
-    waves,
 )
 
 ROUNDING = 1e-12  # of special functions and their recurrence
@@ -60,15 +60,15 @@ def test_truncation_leaves_out_what_it_promises(x):
 
 
 def test_waves_are_zero_at_home():
-    found = waves(np.array([[0.0, 0.0], [3.0, 4.0]]), 2.0, 4)
+    found = outgoing_waves(np.array([[0.0, 0.0], [3.0, 4.0]]), 2.0, 4)
     assert np.all(found[0] == 0)
     np.testing.assert_allclose(found[1, 4 + 3], hankel1(3, 10.0) * (0.6 + 0.8j) ** 3, rtol=ROUNDING)
 
 
 def test_at_wavelength_takes_numbers_and_functions():
     wavelength = np.array([1.0, 2.0])
-    np.testing.assert_array_equal(at_wavelength(1.5, wavelength), [1.5, 1.5])
-    np.testing.assert_array_equal(at_wavelength(lambda w: 1j * w, wavelength), [1j, 2j])
+    np.testing.assert_array_equal(indices_at(1.5, wavelength), [1.5, 1.5])
+    np.testing.assert_array_equal(indices_at(lambda w: 1j * w, wavelength), [1j, 2j])
 
 
 @pytest.mark.parametrize(("beta", "pitch"), [(0.0, 0.26), (2.0, 0.4), (2.0, 0.9), (1.0, 1.3), (6.2, 0.49)])

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from fringetrace.rigorous.mie import amplitudes, coefficients, efficiencies
+from fringetrace.rigorous.mie import amplitude_functions, efficiencies, mie_coefficients
 
 
 def test_efficiencies_of_a_clear_sphere():
@@ -17,9 +17,9 @@ def test_amplitudes_obey_the_optical_theorem_and_add_up():
     x, index = 7.0, 1.6 + 0.05j
     found = efficiencies(x / 2 / math.pi / 1.2, index, 1.2, 1.0)
     nodes, weights = np.polynomial.legendre.leggauss(60)
-    s1, s2 = amplitudes(x / 2 / math.pi / 1.2, index, 1.2, 1.0, np.arccos(nodes))
+    s1, s2 = amplitude_functions(x / 2 / math.pi / 1.2, index, 1.2, 1.0, np.arccos(nodes))
     assert ((abs(s1) ** 2 + abs(s2) ** 2) @ weights) / x**2 == pytest.approx(found.scattering, rel=1e-12)
-    forward = amplitudes(x / 2 / math.pi / 1.2, index, 1.2, 1.0, 0.0)[0][0]
+    forward = amplitude_functions(x / 2 / math.pi / 1.2, index, 1.2, 1.0, 0.0)[0][0]
     assert 4 / x**2 * forward.real == pytest.approx(found.extinction, rel=1e-12)
 
 
@@ -34,10 +34,10 @@ def test_spheres_agree_with_miepython(x, index):
 
 
 def test_coefficients_conserve_power():
-    a, b = coefficients(0.4, 1.5, 1.3, 0.6)
+    a, b = mie_coefficients(0.4, 1.5, 1.3, 0.6)
     np.testing.assert_allclose(abs(1 - 2 * np.stack([a, b])), 1, rtol=1e-12)
 
 
 def test_coefficients_reject_no_radius():
     with pytest.raises(ValueError, match="Sphere: expected positive radius, host and wavelength, got 0"):
-        coefficients(0.0, 1.5, 1.0, 1.0)
+        mie_coefficients(0.0, 1.5, 1.0, 1.0)

@@ -10,7 +10,7 @@ from fringetrace.geometry.mesh import Mesh
 from fringetrace.instruments.interferometer import Bench
 from fringetrace.optics import films, interfaces, polarisers
 from fringetrace.optics.materials.material import Material
-from fringetrace.scene import model
+from fringetrace.scene import model, sensor, sources
 from fringetrace.scenefile.schema import Recipe, call, concrete, kinds, members, parameters
 
 HINTS = {name: parameter.hint for name, parameter in parameters(model.Surface).items()}
@@ -22,7 +22,7 @@ EVERY = [
 
 
 def test_units_are_those_of_the_docstrings():
-    assert {name: p.unit for name, p in parameters(model.Beam).items()} == {
+    assert {name: p.unit for name, p in parameters(sources.Beam).items()} == {
         "centre": "m", "direction": "", "up": "", "size": "m", "shape": "", "profile": "m", "passes": "",
         "polarisation": "",
     } | {"profile": ""}  # fmt: skip
@@ -57,13 +57,13 @@ def test_kinds_are_those_that_a_parameter_takes():
     assert found["Mirror"] is interfaces.Mirror
     assert found["wave_plate"] is polarisers.wave_plate
     assert not {"Sphere", "Meeting", "Branch", "Formula", "Film"} & set(found)
-    assert "Gaussian" in kinds(members(parameters(model.Beam)["profile"].hint))
+    assert "Gaussian" in kinds(members(parameters(sources.Beam)["profile"].hint))
 
 
 def test_alternatives_are_listed_without_none():
     assert members(int | None) == (int,)
     assert members(int | float | None) == (int, float)
-    assert concrete(members(model.CCD | None)) == [model.CCD]
+    assert concrete(members(sensor.CCD | None)) == [sensor.CCD]
 
 
 def test_all_further_arguments_are_a_list():

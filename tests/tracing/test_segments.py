@@ -7,9 +7,10 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import mm, nm
+from fringetrace.accuracy import path_errors
 from fringetrace.core.vectors import rotation, unit
 from fringetrace.geometry import forms, shapes
-from fringetrace.tracing import segments
+from fringetrace.tracing import segments, sensitivity
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -54,7 +55,7 @@ def test_hits_are_off_their_facets_by_roundings():
     for form in (None, SPHERE):
         (met,) = segments.met(ball(form))
         assert met.formed.all() == (form is not None)
-        offset = np.linalg.norm(segments.off(met).astype(float), axis=1)
+        offset = np.linalg.norm(path_errors.off(met).astype(float), axis=1)
         assert 0.0 < offset.max() < 4 * EPS
 
 
@@ -63,7 +64,7 @@ def test_a_hit_that_is_off_is_seen():
     (met,) = segments.met(paths)
     normal = segments.normals(met)
     lifted = replace(met, point=met.point + 5 * nm * normal)
-    np.testing.assert_allclose(segments.off(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS)
+    np.testing.assert_allclose(path_errors.off(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS)
 
 
 def test_a_mirror_moved_along_its_normal_changes_the_path_by_twice_the_cosine():
@@ -71,7 +72,7 @@ def test_a_mirror_moved_along_its_normal_changes_the_path_by_twice_the_cosine():
     (met,) = segments.met(paths)
     normal = segments.normals(met)
     _, direction = segments.legs(paths)
-    change = segments.shifted(paths, met, 1 * nm * normal, direction)
+    change = sensitivity.shifted(paths, met, 1 * nm * normal, direction)
     cosine = np.abs(normal[:, 2])
     # a hit in front of the mirror has a path that is too short
     np.testing.assert_allclose(change.astype(float), -2 * nm * cosine, rtol=1e-12)
@@ -95,7 +96,7 @@ def test_curvature_is_that_of_the_form(name):
     rays = ft.Rays([(0.3, -0.2, 1.0), (0.32, -0.21, 1.0)], [(0, 0, -1.0)] * 2)
     paths = ft.trace(scene, rays, max_bounces=1, record=True)
     (met,) = segments.met(paths)
-    bend, normal = segments.curvature(met), segments.normals(met)
+    bend, normal = path_errors.curvature(met), segments.normals(met)
     np.testing.assert_allclose(np.einsum("nij,nj->ni", bend, normal), 0.0, atol=1e-9)
     if name == "ellipsoid":
         normal = -normal  # heights grow inwards
@@ -113,7 +114,7 @@ def test_curvature_is_that_of_the_form(name):
 def test_patches_bend_like_the_ball_they_were_made_for():
     for form, near in ((forms.Smooth(), 0.1), (None, None)):
         (met,) = segments.met(ball(form, level=4))
-        bend = segments.curvature(met) * 0.1
+        bend = path_errors.curvature(met) * 0.1
         values = np.sort(np.linalg.eigvalsh(bend), axis=1)
         if form is None:
             assert (bend == 0.0).all()
@@ -123,11 +124,11 @@ def test_patches_bend_like_the_ball_they_were_made_for():
 
 def test_facets_leave_out_what_a_form_gives():
     (plain,) = segments.met(ball(None))
-    height, lean = segments.flattened(plain)
+    height, lean = path_errors.flattened(plain)
     assert np.linalg.norm(height, axis=1).max() == pytest.approx(0.1 * 4.528e-3, rel=0.1)
     assert np.linalg.norm(lean, axis=1).max() > 0.05
     (formed,) = segments.met(ball(SPHERE))
-    assert not np.any(segments.flattened(formed))
+    assert not np.any(path_errors.flattened(formed))
 
 
 @pytest.mark.parametrize("longer", [0.0, 3 * nm])
@@ -139,5 +140,5 @@ def test_rounding_is_what_the_path_lacks(longer):
     beam = ft.Beam((0, 0, 1), (0, 0, -1), (0, 1, 0), (1 * mm, 1 * mm), (3, 3))
     for source in (rays, beam):
         paths = ft.trace(scene, source, record=True)
-        error = segments.rounding(replace(paths, length=paths.length + longer))
+        error = path_errors.rounding(replace(paths, length=paths.length + longer))
         np.testing.assert_allclose(error, longer, rtol=0, atol=16 * EPS)

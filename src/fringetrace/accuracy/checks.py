@@ -51,13 +51,13 @@ def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
 
     seen = paths.detected
     if len(seen) == 0:
-        text = contradicted(paths)
+        text = media_contradiction(paths)
         return [] if text is None else [text]
-    texts = [contradicted(paths), aliased(seen, wavelength)]
+    texts = [media_contradiction(paths), aliasing(seen, wavelength)]
     if chosen(paths, method) == "rays":
-        texts += [starved(seen), folded(seen)]
+        texts += [starvation(seen), folding(seen)]
     else:
-        texts.append(focused(seen, wavelength))
+        texts.append(focusing(seen, wavelength))
     return [text for text in texts if text is not None]
 
 
@@ -89,7 +89,7 @@ def check_budget(budget: Budget) -> None:
         warnings.warn(text, FringetraceWarning, stacklevel=3)
 
 
-def judged(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
+def judge(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
     """The error budget of an image, and all that there is to warn of.
 
     Parameters
@@ -108,7 +108,7 @@ def judged(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budge
     return costs, [*found(paths, wavelength, method), *filter(None, [costly(costs)])]
 
 
-def contradicted(paths: Paths) -> str | None:
+def media_contradiction(paths: Paths) -> str | None:
     """Whether rays came to a boundary in another medium than it has on that side.
 
     Parameters
@@ -131,7 +131,7 @@ def contradicted(paths: Paths) -> str | None:
     )
 
 
-def aliased(paths: Paths, wavelength: float) -> str | None:
+def aliasing(paths: Paths, wavelength: float) -> str | None:
     """Whether fringes are too fine for the pixels: the phase between two waves steps by over pi a pixel.
 
     Slopes are means over the rays of one path key, in parts of the image that are as small as the
@@ -180,7 +180,7 @@ def aliased(paths: Paths, wavelength: float) -> str | None:
     )
 
 
-def starved(paths: Paths) -> str | None:
+def starvation(paths: Paths) -> str | None:
     """Whether pixels got no ray though pixels on both sides of them did.
 
     Parameters
@@ -216,7 +216,7 @@ def starved(paths: Paths) -> str | None:
     )
 
 
-def folded(paths: Paths) -> str | None:
+def folding(paths: Paths) -> str | None:
     """Whether a wave folds over the CCD: neighbouring rays arrive in another order than elsewhere.
 
     Where facets fold the light only cells across their edges are turned over, one cell wide: that is none.
@@ -251,7 +251,7 @@ def folded(paths: Paths) -> str | None:
     )
 
 
-def focused(paths: Paths, wavelength: float) -> str | None:
+def focusing(paths: Paths, wavelength: float) -> str | None:
     """Whether a wave comes to a point, a line or a cusp on the CCD, where the light of rays is infinite.
 
     A fold alone is none: the wavefront method knows its uniform form. Looked for in waves off forms.

@@ -207,17 +207,17 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
     (name, float) or None
         The surface that costs most, and the largest error of a path by it, in waves.
     """
-    from fringetrace.accuracy.path_errors import flattened
+    from fringetrace.accuracy.path_errors import flattening
     from fringetrace.tracing import indices, legs, leverage, met, shifted
 
     index = indices(paths)
     length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
     onward = np.cumsum(length[:, ::-1], axis=1)[:, ::-1]
-    narrow = narrowed(paths)
+    narrow = narrowing(paths)
     stood, leant = np.zeros(len(paths)), np.zeros(len(paths))
     worst: dict[str, float] = {}
     for bounces in met(paths):
-        offset, lean = flattened(bounces)
+        offset, lean = flattening(bounces)
         off = np.asarray(shifted(paths, bounces, offset, direction), dtype=np.float64)
         way = np.abs(onward[bounces.path, bounces.bounce + 1]) / narrow[bounces.path]
         turned = leverage(bounces, direction, index) ** 2 * (lean**2).sum(axis=1)
@@ -229,7 +229,7 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
     return _rms(np.hypot(stood, leant) / wavelength, np.abs(paths.amplitude) ** 2), costliest
 
 
-def narrowed(paths: Paths) -> FloatArray:
+def narrowing(paths: Paths) -> FloatArray:
     """Width of the light of each path key on the CCD as a part of its width in the beam.
 
     Parameters

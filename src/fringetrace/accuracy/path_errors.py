@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, unit
-from fringetrace.geometry import dot, standoff
+from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.geometry import standoff
 from fringetrace.scene import Beam
 from fringetrace.tracing import (
     EXTENDED,
@@ -16,14 +16,14 @@ from fringetrace.tracing import (
     indices,
     legs,
     level,
-    materials,
     met,
     normals,
+    scene_media,
     shifted,
 )
 
 
-def off(bounces: Met) -> Array:
+def hit_offsets(bounces: Met) -> Array:
     """Rounding of the hits: how far each stands off its facet, or off the form behind it.
 
     Parameters
@@ -47,7 +47,7 @@ def off(bounces: Met) -> Array:
     return np.asarray(height[:, None] * normal)
 
 
-def flattened(bounces: Met) -> tuple[FloatArray, FloatArray]:
+def flattening(bounces: Met) -> tuple[FloatArray, FloatArray]:
     """What facets leave out of the smooth surface that they may stand for; see `facets.standoff`.
 
     Parameters
@@ -107,7 +107,7 @@ def _lengths(paths: Paths) -> FloatArray:
     """Optical paths, without what thin elements add."""
     if paths.lengths is None or not any(hasattr(s.interface, "act") for s in paths.scene.surfaces):
         return paths.length
-    known = [complex(m.index(paths.wavelength or 1.0)).real for m in materials(paths.scene)]
+    known = [complex(m.index(paths.wavelength or 1.0)).real for m in scene_media(paths.scene)]
     return np.asarray(paths.lengths @ np.array(known), dtype=np.float64)
 
 
@@ -134,7 +134,7 @@ def rounding(paths: Paths) -> FloatArray:
     index = indices(paths)
     error = _lengths(paths).astype(EXTENDED) - (length * index).sum(axis=1)
     for bounces in met(paths):
-        error += shifted(paths, bounces, off(bounces), direction)
+        error += shifted(paths, bounces, hit_offsets(bounces), direction)
     assert paths.points is not None
     if isinstance(paths.source, Beam):  # the phase is 0 on its rectangle
         start = paths.points[:, 0].astype(EXTENDED) - paths.source.centre

@@ -33,7 +33,7 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
     return math.sqrt(off / all_) / (2.0 * math.pi) if all_ > 0.0 else 0.0
 
 
-def bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
+def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
     """Rows of pixels that stand for all: some near the lower end, the middle, the upper end.
 
     Parameters
@@ -56,7 +56,7 @@ def bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
 
 def _parts(ccd: CCD) -> list[CCD]:
     """Parts of a CCD that stand for all of it, for the ray sum."""
-    return [_cut(ccd, top, stop - top, ccd.shape[1]) for top, stop in bands(ccd.shape, MANY)]
+    return [_cut(ccd, top, stop - top, ccd.shape[1]) for top, stop in sample_bands(ccd.shape, MANY)]
 
 
 def _onto(paths: Paths, ccd: CCD) -> Paths:
@@ -118,10 +118,10 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
 def _in_bands(paths: Paths, wavelength: float, more: int = 0) -> list[ComplexArray]:
     """The mean field of pixels that stand for all, by wavefronts; with more points in each."""
     found = reconstruct(paths, wavelength)
-    return [found.refined(wavelength, rows, more) for rows in bands(found.ccd.shape)]
+    return [found.refined(wavelength, rows, more) for rows in sample_bands(found.ccd.shape)]
 
 
-def spread(paths: Paths, wavelength: float) -> Paths:
+def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
     """Rays that stand for the mean of their plane wave over their part of the pixel that they fall in.
 
     Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
@@ -160,7 +160,7 @@ def offset_error(paths: Paths, wavelength: float) -> float:
     assert paths.ccd is not None
     seen = paths.detected
     parts = [_onto(seen, ccd) for ccd in _parts(paths.ccd)]
-    means = [complex_field(spread(part, wavelength), wavelength, "rays") for part in parts]
+    means = [complex_field(spread_over_pixels(part, wavelength), wavelength, "rays") for part in parts]
     return _difference(means, [complex_field(part, wavelength, "rays") for part in parts])
 
 
@@ -192,8 +192,8 @@ def count_error(paths: Paths, wavelength: float) -> float:
         few = all_.where(_even(row) & _even(column))
         assert few.area is not None
         few = replace(few, area=4.0 * few.area)
-        fields.append(complex_field(spread(all_, wavelength), wavelength, "rays"))
-        others.append(complex_field(spread(few, wavelength), wavelength, "rays"))
+        fields.append(complex_field(spread_over_pixels(all_, wavelength), wavelength, "rays"))
+        others.append(complex_field(spread_over_pixels(few, wavelength), wavelength, "rays"))
     return _difference(fields, others)
 
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from xarray import DataArray
 
     from fringetrace.geometry import Mesh
-    from fringetrace.scattering import Detector, Lattice, Polarised
+    from fringetrace.scattering import Detector, Polarised, RodLattice
     from fringetrace.scene import Scene
 
 # What there is to say, each under a word.
@@ -239,9 +239,9 @@ def _medium(text: str | None) -> Any:
         return text
 
 
-def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, dict[str, Any]]:
+def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[RodLattice, dict[str, Any]]:
     """The first lattice, and the values of what has several."""
-    from fringetrace.scattering import Lattice
+    from fringetrace.scattering import RodLattice
 
     lengths = {"radius", "pitch"}
     values: dict[str, Any] = {
@@ -249,7 +249,7 @@ def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, d
         for name, some in given.items()
     }
     cortex, channel = matter["cortex"], matter["channel"]
-    base = Lattice(
+    base = RodLattice(
         **{name: some[0] for name, some in values.items()}, rod=_medium(matter["rod"]),
         host=_medium(matter["host"]), cortex=0.0 if cortex is None else parse_length(cortex, "--cortex"),
         channel=None if channel is None else parse_length(channel, "--channel"),
@@ -258,7 +258,7 @@ def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, d
 
 
 def _endless(
-    base: Lattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray], polarisation: Polarised,
+    base: RodLattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray], polarisation: Polarised,
     over: DataArray | None, out: Path,
 ) -> Lines:  # fmt: skip
     """Specular spectra of endless rows, layered and rigorous."""
@@ -348,12 +348,12 @@ def _budget(table: DataArray, scene: Scene, detector: Detector, options: dict[st
 
     shortest, theta = float(table.wavelength.min()), float(table.theta_i[len(table.theta_i) // 2])
     hit = scattering.rounding_error(scene, theta, shortest, **options)
-    sampling = scattering.sampling_error(table, scene, detector, **options)
+    sampling = scattering.brdf_sampling_error(table, scene, detector, **options)
     return "budget", f"hit {hit:.1e} waves rms; half the rays change the BRDF by {sampling:.1%} rms"
 
 
 def _first(
-    base: Lattice, table: DataArray, axes: dict[str, Any], theta: FloatArray, options: dict[str, Any]
+    base: RodLattice, table: DataArray, axes: dict[str, Any], theta: FloatArray, options: dict[str, Any]
 ) -> Lines:
     """The budget of the first of some lattices, unless it was found without rays."""
     from fringetrace import scattering

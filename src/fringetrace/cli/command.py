@@ -172,12 +172,12 @@ def bench(
     """
     from fringetrace.validation import STANDARDS, work_precision
 
-    names = work_precision.checked(scenes or STANDARDS)
+    names = work_precision.checked_standards(scenes or STANDARDS)
     with staged(out) as folder, _progress("running") as advance:
         done = list(work_precision.runs(names, quick, advance))
         work_precision.write(done, folder)
     console = _console()
-    console.print(work_precision.table(done), markup=False)
+    console.print(work_precision.markdown_table(done), markup=False)
     _say(console, "written", f"{out}: {', '.join(work_precision.FILES)}")
 
 
@@ -204,12 +204,12 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
         method = chosen(bench.trace(), bench.method)
-        costing = aside.submit(checks.judged, bench.trace(), wavelength, method)
-        measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
+        costing = aside.submit(checks.judge, bench.trace(), wavelength, method)
+        measured = measurement.measure_height(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)
         measurement.write_pictures(measured, folder)
-        measurement.write_netcdf(measured, folder / "result.nc")
+        measurement.write_measurement(measured, folder / "result.nc")
         measurement.write_heights(measured, folder, settings.zygo)
         costs, notes = costing.result()
         _say(console, "budget", f"of the image: {costs.line}")

@@ -6,14 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fringetrace.cli.brdf_commands import Lines
 from fringetrace.core import parse_length
 
 if TYPE_CHECKING:
     from fringetrace.scene import Scene
     from fringetrace.tracing import Paths
-
-# What there is to say, each under a word.
-Lines = list[tuple[str, str]]
 
 
 def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False) -> Iterator[tuple[str, str]]:
@@ -35,9 +33,9 @@ def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False)
     from fringetrace import scenefile
     from fringetrace.scenefile import run
 
-    setup = scenefile.load(scene, allow_outside=allow_outside)
+    experiment = scenefile.load(scene, allow_outside=allow_outside)
     folder = Path(f"fringetrace-{scene.stem}") if out is None else out
-    yield from run.run(setup, folder)
+    yield from run.run(experiment, folder)
 
 
 def init(name: str, /) -> Iterator[tuple[str, str]]:
@@ -127,10 +125,10 @@ def _seen(
         raise ValueError(f"--rays: expected at least 1, got {rays}")
     if path.suffix.lower() != ".toml":
         return Scene((Surface(meshes.load(path, unit=unit), Mirror(), path.stem),)), [], {}
-    setup = scenefile.load(path, allow_outside=allow_outside)
-    if wavelength is None and setup.wavelengths:
-        wavelength = setup.wavelengths[0]
-    scene, paths, image, reference = run.seen(setup, wavelength, rays)
+    experiment = scenefile.load(path, allow_outside=allow_outside)
+    if wavelength is None and experiment.wavelengths:
+        wavelength = experiment.wavelengths[0]
+    scene, paths, image, reference = run.scene_to_draw(experiment, wavelength, rays)
     # as many as were traced are drawn
     looks = {
         "wavelength": wavelength,

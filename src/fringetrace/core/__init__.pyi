@@ -3,7 +3,7 @@ from .compiled import grown as grown, jit as jit, part as part
 from .files import staged as staged, whole as whole
 from .sweeps import grid as grid, sweep as sweep
 from .tables import (
-    Axes as Axes,
+    Coordinates as Coordinates,
     array as array,
     read_csv as read_csv,
     write_csv as write_csv,
@@ -32,6 +32,7 @@ from .vectors import (
     checked_rotation as checked_rotation,
     checked_vector as checked_vector,
     component as component,
+    dot as dot,
     frame as frame,
     rotation as rotation,
     unit as unit,

@@ -19,7 +19,7 @@ import numpy as np
 from fringetrace.core.units import Array
 
 Cell = Mapping[str, Any]
-Result = dict[str, Array]
+CellResult = dict[str, Array]
 # Where BLAS, OpenMP and numba read how many threads they may have.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 # What a function's one array is called in its file.
@@ -90,7 +90,7 @@ def key(function: Callable[..., Any], cell: Cell) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _arrays(result: Any) -> Result:
+def _arrays(result: Any) -> CellResult:
     """What a function gave, as arrays by name."""
     named = result if isinstance(result, Mapping) else {ALONE: result}
     arrays = {str(name): np.asarray(value) for name, value in named.items()}
@@ -100,7 +100,7 @@ def _arrays(result: Any) -> Result:
     return arrays
 
 
-def _save(arrays: Result, path: Path) -> None:
+def _save(arrays: CellResult, path: Path) -> None:
     """Write beside the place, then move there: a file that is there is whole."""
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -113,12 +113,12 @@ def _save(arrays: Result, path: Path) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _load(path: Path) -> Result:
+def _load(path: Path) -> CellResult:
     with np.load(path, allow_pickle=False) as stored:
         return {name: stored[name] for name in stored.files}
 
 
-def _call(function: Callable[..., Any], cell: Cell) -> Result:
+def _call(function: Callable[..., Any], cell: Cell) -> CellResult:
     return _arrays(function(**cell))
 
 
@@ -171,7 +171,7 @@ def sweep(
     scheduler: str | None = None,
     processes: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[Result]:
+) -> list[CellResult]:
     """Call a function with each of many sets of parameters; the results in their order.
 
     With a folder each result is kept in a file of its own as soon as it is there, and cells whose file
@@ -213,7 +213,7 @@ def sweep(
     """
     names = [key(function, cell) for cell in cells]
     place = None if folder is None else Path(folder)
-    done: dict[str, Result] = {}
+    done: dict[str, CellResult] = {}
     if place is not None:
         place.mkdir(parents=True, exist_ok=True)
         done = {name: _load(place / f"{name}.npz") for name in names if (place / f"{name}.npz").exists()}
@@ -240,8 +240,8 @@ def _said(cell: Cell) -> dict[str, Any]:
 
 
 def _as_they_come(
-    futures: dict[Future[Result], str], cells: Mapping[str, Cell]
-) -> Iterator[tuple[str, Result]]:
+    futures: dict[Future[CellResult], str], cells: Mapping[str, Cell]
+) -> Iterator[tuple[str, CellResult]]:
     """Results with their names; after a failure, what has not begun is given up."""
     try:
         for future in as_completed(list(futures)):

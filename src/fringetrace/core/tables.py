@@ -18,12 +18,14 @@ if TYPE_CHECKING:
     from xarray import DataArray, Dataset
 
 # Axes: name to values and unit.
-Axes = Mapping[str, tuple[Any, str]]
+Coordinates = Mapping[str, tuple[Any, str]]
 # "wavelength / nm", "Wavelength (nm)", "lambda [um]", "wavelength_nm"
 _HEAD = re.compile(r".*?[\s/_(\[]\s*([a-zµμ]+)\s*[)\]]?\s*", re.IGNORECASE)
 
 
-def labelled(values: npt.ArrayLike, axes: Axes, *, name: str, unit: str, **attributes: Any) -> DataArray:
+def labelled(
+    values: npt.ArrayLike, axes: Coordinates, *, name: str, unit: str, **attributes: Any
+) -> DataArray:
     """An array whose axes have names and units.
 
     Parameters
@@ -75,7 +77,7 @@ def array(
     return xarray.DataArray(values, dict(coordinates), axes, name=name, attrs=dict(attributes))
 
 
-def dataset(
+def labelled_dataset(
     variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Mapping[str, Any]
 ) -> Dataset:
     """Several arrays that share axes.

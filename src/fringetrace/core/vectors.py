@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core.units import FloatArray
+from fringetrace.core.units import Array, FloatArray
 
 # A matrix that changes lengths by more than this part was not meant as a rotation.
 STRETCH = 1e-9
@@ -101,6 +101,20 @@ def component(vectors: FloatArray, axis: FloatArray) -> FloatArray:
         The same bits for each row, whatever the others: a matrix product's depend on how many there are.
     """
     return np.asarray(np.einsum("ij,j->i", vectors, axis), dtype=np.float64)
+
+
+def dot(a: Array, b: Array) -> Array:
+    """Scalar products of rows, without conjugation.
+
+    Parameters
+    ----------
+    a, b : (n, 3) float64 or complex128
+
+    Returns
+    -------
+    (n,) float64 or complex128
+    """
+    return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
 def frame(normal: npt.ArrayLike, up: npt.ArrayLike, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -1,5 +1,5 @@
 from .coherent_sum import (
-    Light as Light,
+    PixelLight as PixelLight,
     chosen as chosen,
     complex_field as complex_field,
     irradiance as irradiance,
@@ -8,4 +8,4 @@ from .coherent_sum import (
 )
 from .ray_sum import RaySum as RaySum, centred as centred, products as products
 from .spectral_sum import TOLERANCE as TOLERANCE, spectrum as spectrum
-from .wavefront import Wavefronts as Wavefronts, reconstruct as reconstruct
+from .wavefront.wavefronts import Wavefronts as Wavefronts, reconstruct as reconstruct

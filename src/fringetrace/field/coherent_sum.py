@@ -14,8 +14,9 @@ from fringetrace.field.ray_sum import RaySum
 from fringetrace.scene import Beam, Spectrum
 from fringetrace.tracing import Paths, at_wavelength, join, needs
 
-class Light(Protocol):
-    """Light on the pixels of a CCD, however it is found: what `complex_field` and its kin ask."""
+
+class PixelLight(Protocol):
+    """PixelLight on the pixels of a CCD, however it is found: what `complex_field` and its kin ask."""
 
     def complex_field(
         self, wavelength: float, groups: npt.ArrayLike | None = None, half_wave_loss: bool = True
@@ -50,14 +51,14 @@ def method_for(paths: Paths) -> str:
     -------
     {"wavefront", "rays"}
     """
-    from fringetrace.scene import parted
+    from fringetrace.scene import group_facets
 
     if not isinstance(paths.source, Beam) or paths.ccd is None or torn(paths):
         return "rays"
     most = max(FEW, int(np.prod(paths.source.shape)) // SHARING)
     flat = [surface for surface in paths.scene.surfaces if surface.form is None]
     if sum(len(surface.mesh.faces) for surface in flat) > most:
-        parts = parted(paths.scene)
+        parts = group_facets(paths.scene)
         facets = [parts[i].max() + 1 for i, s in enumerate(paths.scene.surfaces) if s.form is None]
         if sum(facets) > most:
             return "rays"
@@ -218,7 +219,7 @@ def chosen(paths: Paths, method: str) -> str:
     return method_for(paths) if method == "auto" else method
 
 
-def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto") -> Light:
+def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto") -> PixelLight:
     """The light that paths bring to their CCD, by some method, to be evaluated at a wavelength.
 
     Parameters
@@ -228,7 +229,7 @@ def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "a
 
     Returns
     -------
-    Light
+    PixelLight
         `Wavefronts`, which are kept with the paths, or a `RaySum`.
 
     Raises
@@ -240,7 +241,7 @@ def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "a
     first, parts = _first(paths)
     if chosen(first, method) == "rays":
         return RaySum(at_wavelength(part, wavelength) for part in parts)
-    from fringetrace.field.wavefront import reconstruct
+    from fringetrace.field.wavefront.wavefronts import reconstruct
 
     # chunks of a stream are parts of one beam
     beams = [list(some) for _, some in groupby(parts, lambda part: id(part.source))]
@@ -249,7 +250,7 @@ def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "a
 
 def _lights(
     paths: Paths | Iterable[Paths], light: float | Spectrum, method: str
-) -> Iterator[tuple[float, float | Spectrum, Light]]:
+) -> Iterator[tuple[float, float | Spectrum, PixelLight]]:
     """Parts of some light that are evaluated together: a factor, the part, and what brings it to the CCD."""
     if not isinstance(light, Spectrum):
         yield 1.0, light, light_on(paths, light, method)

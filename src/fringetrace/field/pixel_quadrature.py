@@ -32,7 +32,7 @@ class Case(NamedTuple):
     image: int = 0
 
 
-class Light(Protocol):
+class SampledLight(Protocol):
     """Fields of some groups at sample points."""
 
     groups: int
@@ -41,7 +41,7 @@ class Light(Protocol):
         """What is the same at all wavelengths."""
 
     def field(self, found: Any, case: Case) -> tuple[ComplexArray, FloatArray]:
-        """Fields (groups, points); if `slopes` were wanted a row for each point, see `fringes`, else (0, 4)."""
+        """Fields (groups, points), and slopes, see `fringes`: (points, 4), or (0, 4) if not wanted."""
 
 
 def fringes(slope: FloatArray, carrier: bool) -> FloatArray:
@@ -67,7 +67,7 @@ def fringes(slope: FloatArray, carrier: bool) -> FloatArray:
 
 def averaged(
     shape: tuple[int, int],
-    light: Light,
+    light: SampledLight,
     cases: Sequence[Case],
     carrier: bool,
     cuts: Edges | None = None,
@@ -85,7 +85,7 @@ def averaged(
     ----------
     shape : (rows, columns)
         Of the CCD.
-    light : Light
+    light : SampledLight
     cases : sequence of Case
     carrier : bool
         Means of the fields, for which pixels are sampled for the whole slope of the phase; else means of
@@ -218,7 +218,7 @@ def _around(values: Array) -> Array:
     return np.asarray(np.maximum(np.maximum(wide[:rows], wide[1:-1]), wide[2:]))
 
 
-def _centres(shape: tuple[int, int], top: int, light: Light) -> list[Any]:
+def _centres(shape: tuple[int, int], top: int, light: SampledLight) -> list[Any]:
     """What waves bring to the centres of pixels, band by band."""
     order = np.ones(shape, dtype=np.int64)
     return _each(lambda band: light.at(samples(order[slice(*band)], top + band[0]), True), bands(order))

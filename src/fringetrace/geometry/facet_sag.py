@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from fringetrace.core import FloatArray, unit
-from fringetrace.geometry.implicit import dot
-from fringetrace.geometry.triangles import weld
-
-IndexArray = npt.NDArray[np.int64]
+from fringetrace.core import FloatArray, dot, unit
+from fringetrace.geometry.triangles import IndexArray, weld
 
 # Facets whose normals are more than 30 degrees (cosine) apart meet in an edge of the part.
 SHARP = 0.8660254037844387

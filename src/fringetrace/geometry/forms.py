@@ -20,9 +20,10 @@ from fringetrace.core import (
     checked_rotation,
     checked_vector,
     component,
+    dot,
     unit,
 )
-from fringetrace.geometry.implicit import EPSILON, Fit, dot, fit_level
+from fringetrace.geometry.implicit import EPSILON, Fit, fit_level
 from fringetrace.geometry.pn_triangles import patched, vertex_normals
 
 # Past its equator by no more than this, in radii squared, a conic is at it.

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, unit
+from fringetrace.core import Array, FloatArray, dot, unit
 
 EPSILON = float(np.finfo(np.float64).eps)
 # Vertices this part of the mesh's size off the form are not meant to lie on it.
@@ -77,11 +77,6 @@ class Level(Protocol):
 
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """The function (n,), its gradient (n, 3), and its second derivative along the directions (n,)."""
-
-
-def dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Scalar products (n,) of the rows of (n, 3)."""
-    return np.asarray(np.einsum("ij,ij->i", a, b), dtype=np.float64)
 
 
 def advance(value: FloatArray, slope: FloatArray, bend: FloatArray, side: FloatArray) -> FloatArray:

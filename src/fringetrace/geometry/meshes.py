@@ -31,7 +31,7 @@ from fringetrace.geometry.shapes import (
     step,
 )
 from fringetrace.geometry.triangles import IndexArray, height_above, weld
-from fringetrace.geometry.zygo import KINDS, existing, read_height_map, write_height_map
+from fringetrace.geometry.zygo import KINDS, existing_file, read_height_map, write_height_map
 
 if TYPE_CHECKING:
     from pyvista import PolyData
@@ -98,13 +98,13 @@ def _loaded(path: str | os.PathLike[str], unit: str | None) -> Mesh:
         z, pitch = read_height_map(path)
         return height_map(z, pitch, name=Path(path).name)
     if suffix == ARCHIVE:
-        return _archived(existing(path), unit_length(unit, f"{Path(path).name} unit"))
+        return _archived(existing_file(path), unit_length(unit, f"{Path(path).name} unit"))
     from trimesh.exchange.load import mesh_formats
 
     known = sorted({*KINDS, ARCHIVE} | {f".{kind}" for kind in mesh_formats()})
     if suffix not in known:
         raise ValueError(f"{path}: expected a file named {', '.join(known)}, got {suffix or 'no suffix'!r}")
-    file = existing(path)
+    file = existing_file(path)
     scale = unit_length(unit, f"{file.name} unit")
     vertices, faces = weld(*_parsed(file))
     try:
@@ -280,7 +280,7 @@ def elevation_sample(relief: float, aperture: float) -> tuple[FloatArray, float]
     found = importlib.util.find_spec("matplotlib")  # finds the folder without importing it
     folder = Path(found.origin).parent if found is not None and found.origin else Path()
     file = folder / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
-    with np.load(existing(file), allow_pickle=False) as data:
+    with np.load(existing_file(file), allow_pickle=False) as data:
         metres = data["elevation"][::-1].astype(np.float64)
     z = relief * (metres - metres.min()) / np.ptp(metres)
     return z, aperture / (max(z.shape) - 1)

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, unit
-from fringetrace.geometry.implicit import EPSILON, ROUNDINGS, STEPS, Meeting, advance, dot
+from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.geometry.implicit import EPSILON, ROUNDINGS, STEPS, Meeting, advance
 
 # Vertex normals may lean this far (cosine) from a face's: beyond, the mesh has an edge there.
 LEAN = 0.75

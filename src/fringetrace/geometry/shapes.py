@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from fringetrace.core import FloatArray, checked_length, unit
 from fringetrace.geometry.mesh import Mesh
-from fringetrace.geometry.triangles import IndexArray, crossing, doubled_area, triangulate, weld
+from fringetrace.geometry.triangles import IndexArray, doubled_area, self_crossing, triangulate, weld
 
 _G = 0.5 + math.sqrt(1.25)  # golden ratio
 # fmt: off
@@ -151,7 +151,7 @@ def extrude(polyline: npt.ArrayLike, depth: float, *, closed: bool = False, name
 
 def _with_caps(sheet: IndexArray, polygon: FloatArray, name: str) -> IndexArray:
     """The strips turned to face outwards, and both ends filled."""
-    meets = crossing(polygon)
+    meets = self_crossing(polygon)
     if meets:
         raise ValueError(
             f"{name}: expected a line that does not meet itself, got segments {meets[0]} and {meets[1]}"

@@ -58,7 +58,7 @@ def doubled_area(polygon: FloatArray) -> float:
     return float(_cross(spokes, np.roll(spokes, -1, axis=0)).sum())
 
 
-def crossing(polygon: FloatArray) -> tuple[int, int] | None:
+def self_crossing(polygon: FloatArray) -> tuple[int, int] | None:
     """Two sides of a closed polygon that meet where they should not.
 
     Parameters

@@ -28,7 +28,7 @@ NO_DATA = float(np.finfo(np.float64).max)
 SURFACE = "/Data/Surface/{00000000-0000-0000-0000-000000000001}"
 
 
-def existing(path: str | os.PathLike[str]) -> Path:
+def existing_file(path: str | os.PathLike[str]) -> Path:
     """A path, once it is known to be that of a file.
 
     Raises
@@ -63,7 +63,7 @@ def read_height_map(path: str | os.PathLike[str]) -> tuple[FloatArray, float]:
     ValueError
         If it is neither of these, is cut short, or was written without a lateral calibration.
     """
-    file = existing(path)
+    file = existing_file(path)
     suffix = file.suffix.lower()
     if suffix not in KINDS:
         raise ValueError(f"{path}: expected a height map named {METROPRO} or {MX}, got {suffix!r}")

@@ -6,7 +6,7 @@ from .beam_splitters import (
     semi_reflecting as semi_reflecting,
 )
 from .fizeau_bench import fizeau as fizeau
-from .interferometer import Bench as Bench, stepped as stepped
+from .interferometer import Bench as Bench, step_axis as step_axis
 from .jamin_lebedeff_bench import jamin_lebedeff as jamin_lebedeff
 from .layout import TILT as TILT
 from .mach_zehnder_bench import mach_zehnder as mach_zehnder

@@ -10,7 +10,7 @@ import numpy as np
 from fringetrace.core import FloatArray, nm, rotation
 from fringetrace.geometry import Mesh, plate
 from fringetrace.instruments.layout import real_index
-from fringetrace.optics import Absorber, Dielectric, Film, Material, as_material, refracted
+from fringetrace.optics import Absorber, Dielectric, Film, Material, as_material, refract
 from fringetrace.scene import Surface
 
 # Sine squared of the incidence at a plate that stands at 45 degrees.
@@ -168,7 +168,7 @@ class SplitterPlate:
         z, x : float, metres
         """
         normal = _turn()[:, 2]
-        inside = refracted(np.array([1.0, 0.0, 0.0]), normal, 1.0, real_index(self.glass, self.design))
+        inside = refract(np.array([1.0, 0.0, 0.0]), normal, 1.0, real_index(self.glass, self.design))
         down = inside - 2.0 * (inside @ normal) * normal
         enters = -inside * (self.thickness / (inside @ normal))
         leaves = down * (self.thickness / -(down @ normal))

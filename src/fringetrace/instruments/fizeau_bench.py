@@ -103,7 +103,7 @@ def fizeau(
     TypeError
         If the sample is no mesh.
     """
-    size = layout.checked_image("fizeau", aperture, pixels, rays)
+    size = layout.checked_image_size("fizeau", aperture, pixels, rays)
     surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
     layout.checked_tilt("fizeau", reference_tilt)
     layout.checked_tilt("fizeau", wedge)
@@ -124,7 +124,7 @@ def fizeau(
     )
     beam = Beam(
         centre=-arm * x, direction=x, up=y, size=size, shape=layout.ray_grid(pixels, rays),
-        profile=layout.seen(profile),
+        profile=layout.flip_profile(profile),
     )  # fmt: skip
     outside, inside, filled = (layout.real_index(m, design) for m in (around, glass, between))
     focus = 2.0 * arm - top + gap * outside / filled + (top - gap) * outside / inside
@@ -164,17 +164,21 @@ def _plate(
     coatings: tuple[Film | None, Film | None],
 ) -> tuple[Surface, ...]:
     """The reference face, its front in the glass, and the upper face if there is one."""
-    face = _face(size, radius).moved(turn=layout.standing(layout.leaning(tilt))).moved((0.0, 0.0, gap))
+    face = (
+        _face(size, radius)
+        .moved(turn=layout.standing_rotation(layout.tilted_normal(tilt)))
+        .moved((0.0, 0.0, gap))
+    )
     inside, filled = as_material(glass), as_material(between)
     form = None
     if math.isfinite(radius):
-        centre = np.array([0.0, 0.0, gap]) + radius * layout.leaning(tilt)
+        centre = np.array([0.0, 0.0, gap]) + radius * layout.tilted_normal(tilt)
         form = Sphere(centre, abs(radius))
     reference = Surface(face, Dielectric(film=coatings[0]), "reference", form, inside, filled)
     if thickness is None:
         return (reference,)
     wide = 4.0 * max(size)
-    upper = plate(wide, wide).moved(turn=layout.standing(layout.leaning(wedge)))
+    upper = plate(wide, wide).moved(turn=layout.standing_rotation(layout.tilted_normal(wedge)))
     return reference, Surface(
         upper.moved((0.0, 0.0, gap + thickness)),
         Dielectric(film=coatings[1]),

@@ -18,10 +18,10 @@ from fringetrace.scene import pixel_centres
 if TYPE_CHECKING:
     from xarray import Dataset
 
-    from fringetrace.core import Axes
+    from fringetrace.core import Coordinates
 
 
-def stepped(steps: int) -> Axes:
+def step_axis(steps: int) -> Coordinates:
     """The axis of phase-stepped frames: a period in equal steps, radians."""
     return {"step": (2.0 * math.pi * np.arange(steps) / steps, "rad")}
 
@@ -126,7 +126,7 @@ class Bench(Rig):
         """
         if steps < 3:
             raise ValueError(f"phase steps: expected at least 3, got {steps}")
-        shifts = stepped(steps)["step"][0]
+        shifts = step_axis(steps)["step"][0]
 
         def frames() -> FloatArray:
             return np.stack([self._recorded(light, shift) for shift in shifts])
@@ -248,6 +248,6 @@ class Bench(Rig):
             "field_imag": (axes, field.imag),
         }
         return records.dataset(
-            images, self.ccd.pitch, stepped(steps), wavelength_m=wavelength,
+            images, self.ccd.pitch, step_axis(steps), wavelength_m=wavelength,
             reference_tilt_rad=list(self.tilt), method=self.method,
         )  # fmt: skip

@@ -24,7 +24,9 @@ STEEP = STEEPEST / math.hypot(1.0, STEEPEST)
 Sample = Mesh | Surface | Iterable[Surface]
 
 
-def checked_image(bench: str, aperture: float, pixels: tuple[int, int], rays: float) -> tuple[float, float]:
+def checked_image_size(
+    bench: str, aperture: float, pixels: tuple[int, int], rays: float
+) -> tuple[float, float]:
     """Width and height of an image, once numbers are known to be good.
 
     Parameters
@@ -65,7 +67,7 @@ def ray_grid(pixels: tuple[int, int], rays: float) -> tuple[int, int]:
     return max(least, round(pixels[0] * rays)), max(least, round(pixels[1] * rays))
 
 
-def seen(profile: Profile | None) -> Profile | None:
+def flip_profile(profile: Profile | None) -> Profile | None:
     """A profile over the image as one over a beam whose columns run along -x."""
     return None if profile is None else partial(_mirrored, profile)
 
@@ -74,28 +76,28 @@ def _mirrored(profile: Profile, x: FloatArray, y: FloatArray) -> FloatArray:
     return profile(-x, y)
 
 
-def standing(normal: FloatArray) -> FloatArray:
+def standing_rotation(normal: FloatArray) -> FloatArray:
     """Turn (3, 3) of a plate from facing +z to a normal in any direction but y, its rows still along y."""
     n = unit(np.asarray(normal, dtype=np.float64)[None])[0]
     side = unit(np.cross([0.0, 1.0, 0.0], n)[None])[0]
     return np.stack([side, np.cross(n, side), n], axis=1)
 
 
-def leaning(tilt: tuple[float, float]) -> FloatArray:
+def tilted_normal(tilt: tuple[float, float]) -> FloatArray:
     """Normal of a mirror that faced +z, tilted: path_slope of its light is along the tilt."""
     angle = math.hypot(*tilt)
     scale = math.sin(angle) / angle if angle > 0.0 else 1.0
     return np.array([scale * tilt[0], scale * tilt[1], math.cos(angle)])
 
 
-def surrounding(medium: Material | complex | str | None) -> Material | None:
+def surrounding_medium(medium: Material | complex | str | None) -> Material | None:
     """The medium around a bench, from what stands for one; None: a vacuum."""
     from fringetrace.optics import as_material
 
     return None if medium is None else as_material(medium, "medium")
 
 
-def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...]:
+def transmitting_surfaces(bench: str, sample: Sample, index: object) -> tuple[Surface, ...]:
     """The surfaces of a sample that light goes through.
 
     Parameters
@@ -131,7 +133,7 @@ def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...
     return (Surface(mesh, Dielectric("transmitted"), "sample", back=index),)  # type: ignore[arg-type]
 
 
-def extent(surfaces: Iterable[Surface], aperture: float) -> tuple[float, float]:
+def sample_extent(surfaces: Iterable[Surface], aperture: float) -> tuple[float, float]:
     """How far a sample reaches from the axis (the image at least), and from z = 0 to either side, metres."""
     bounds = np.array([surface.mesh.bounds for surface in surfaces])
     aside = float(np.abs(bounds[:, :, :2]).max())

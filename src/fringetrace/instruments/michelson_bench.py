@@ -107,7 +107,7 @@ def michelson(
     """
     surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
     thick = splitter if isinstance(splitter, SplitterPlate) else None
-    size = layout.checked_image("michelson", aperture, pixels, rays)
+    size = layout.checked_image_size("michelson", aperture, pixels, rays)
     arm = _arm(size, arm, float(surface.mesh.bounds[1, 2]), thick)
     _check_reference(reference_tilt, piston, arm)
     if compensator and thick is None:
@@ -135,7 +135,7 @@ def michelson(
     )
     beam = Beam(
         centre=rise * z - arm * x, direction=x, up=y, size=size, shape=layout.ray_grid(pixels, rays),
-        profile=layout.seen(profile),
+        profile=layout.flip_profile(profile),
     )  # fmt: skip
     ccd = CCD(
         centre=arm * z, normal=-z, up=y, pitch=aperture / columns, shape=(rows, columns),

@@ -54,7 +54,7 @@ def coordinates(shape: tuple[int, int], pitch: float) -> dict[str, Any]:
 
 
 def dataset(
-    images: Mapping[str, Any], pitch: float, axes: tables.Axes | None = None, **attributes: Any
+    images: Mapping[str, Any], pitch: float, axes: tables.Coordinates | None = None, **attributes: Any
 ) -> Dataset:
     """Images of one CCD as a labelled dataset: interferograms, fields, phase and height maps.
 
@@ -93,4 +93,4 @@ def dataset(
     further = {name: (name, values, {"units": unit}) for name, (values, unit) in (axes or {}).items()}
     about = {**attributes, "pixel_pitch_m": pitch, "convention": CONVENTION}
     (shape,) = shapes
-    return tables.dataset(named, {**further, **coordinates(shape, pitch)}, about)
+    return tables.labelled_dataset(named, {**further, **coordinates(shape, pitch)}, about)

@@ -22,17 +22,18 @@ from fringetrace.core import (
     checked_rotation,
     checked_vector,
     component,
+    dot,
 )
 
 # An axis nearer to a ray than its own rounding has no direction across it.
 PARALLEL = 8.0 * float(np.finfo(np.float64).eps)
 
-Index = float | Callable[[float], float]
+RealIndex = float | Callable[[float], float]
 Waves = Literal["plane", "curved", "torn"]
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
+class IncidentRays:
     """Rays that met one element.
 
     Parameters
@@ -103,14 +104,14 @@ class Element(Protocol):
     def chromatic(self) -> bool:
         """Whether rays depend on the wavelength."""
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """The branches, with a row for each ray."""
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Element:
         """The element turned about the origin, then shifted; as `Mesh.moved`."""
 
 
-def checked_length(value: float, what: str) -> float:
+def positive_length(value: float, what: str) -> float:
     """A positive length; ValueError if it is none."""
     if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
         raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
@@ -124,7 +125,7 @@ def checked_number(value: float, what: str) -> float:
     return float(value)
 
 
-def checked_index(value: Index, what: str) -> Index:
+def checked_index(value: RealIndex, what: str) -> RealIndex:
     """A refractive index, or the function of the wavelength that gives it; ValueError if it is neither."""
     if callable(value):
         return value
@@ -133,38 +134,33 @@ def checked_index(value: Index, what: str) -> Index:
     return float(value)
 
 
-def index_at(index: Index, wavelength: float | None, what: str) -> float:
+def index_at(index: RealIndex, wavelength: float | None, what: str) -> float:
     """Real refractive index at a wavelength (metres)."""
-    return float(np.real(index(asked(wavelength, what)))) if callable(index) else index
+    return float(np.real(index(required_wavelength(wavelength, what)))) if callable(index) else index
 
 
-def asked(wavelength: float | None, what: str) -> float:
+def required_wavelength(wavelength: float | None, what: str) -> float:
     """The wavelength, in metres; ValueError if there is none."""
     if wavelength is None:
         raise ValueError(f"{what}: expected a wavelength, which it depends on, got None")
     return wavelength
 
 
-def vectors_of(meeting: Meeting, what: str) -> ComplexArray:
+def vectors_of(meeting: IncidentRays, what: str) -> ComplexArray:
     """The fields, (n, 3) complex128; ValueError if they are no vectors."""
     if meeting.field.ndim != 2:
         raise ValueError(f"{what}: expected polarised light, fields (n, 3), got shape {meeting.field.shape}")
     return meeting.field
 
 
-def shifted(point: FloatArray, offset: npt.ArrayLike, turn: npt.ArrayLike | None) -> FloatArray:
+def move_point(point: FloatArray, offset: npt.ArrayLike, turn: npt.ArrayLike | None) -> FloatArray:
     """A point (3,) turned about the origin, then shifted."""
-    return turned(point, turn) + checked_vector(offset, "offset")
+    return rotate_vector(point, turn) + checked_vector(offset, "offset")
 
 
-def turned(vector: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
+def rotate_vector(vector: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
     """A vector (3,) turned about the origin."""
     return vector if turn is None else np.asarray(checked_rotation(turn, "turn") @ vector, dtype=np.float64)
-
-
-def dot(a: Array, b: Array) -> Array:
-    """Scalar products of rows, (n, 3) and (n, 3), without conjugation."""
-    return np.asarray(np.einsum("ij,ij->i", a, b))
 
 
 def scaled(rows: Array, factor: Array) -> Array:
@@ -172,12 +168,12 @@ def scaled(rows: Array, factor: Array) -> Array:
     return np.asarray(rows * (factor if rows.ndim == 1 else factor[:, None]))
 
 
-def within(vectors: FloatArray, normal: FloatArray) -> FloatArray:
+def tangential(vectors: FloatArray, normal: FloatArray) -> FloatArray:
     """Vectors without their part along unit normals, (n, 3)."""
     return np.asarray(vectors - scaled(normal, dot(vectors, normal)))
 
 
-def across(axis: FloatArray, direction: FloatArray) -> FloatArray:
+def transverse_axis(axis: FloatArray, direction: FloatArray) -> FloatArray:
     """An axis as rays see it: its part across them, scaled to unit length.
 
     Parameters
@@ -191,21 +187,21 @@ def across(axis: FloatArray, direction: FloatArray) -> FloatArray:
         Unit, or 0 where the axis is along the ray.
     """
     # twice: what rounding leaves along a ray close to the axis
-    part = within(within(np.broadcast_to(axis, direction.shape), direction), direction)
+    part = tangential(tangential(np.broadcast_to(axis, direction.shape), direction), direction)
     size = np.sqrt(dot(part, part))
     seen = size > PARALLEL
     return np.where(seen[:, None], part / np.where(seen, size, 1.0)[:, None], 0.0)
 
 
-def lying(axis: FloatArray, normal: FloatArray, what: str) -> FloatArray:
+def tangential_axis(axis: FloatArray, normal: FloatArray, what: str) -> FloatArray:
     """An axis as it lies in surfaces, (n, 3) unit; ValueError if it stands on one of them."""
-    lie = across(axis, normal)
+    lie = transverse_axis(axis, normal)
     if not lie.any(axis=1).all():
         raise ValueError(f"{what}: expected a direction along the surface, got its normal {axis.tolist()}")
     return lie
 
 
-def carried(field: ComplexArray, before: FloatArray, after: FloatArray) -> ComplexArray:
+def rotate_fields(field: ComplexArray, before: FloatArray, after: FloatArray) -> ComplexArray:
     """Fields of rays that are bent, turned by the least rotation that takes one direction to the other.
 
     Parameters
@@ -226,7 +222,7 @@ def carried(field: ComplexArray, before: FloatArray, after: FloatArray) -> Compl
     return np.asarray(field - scaled(before + after, share))
 
 
-def bent(meeting: Meeting, gradient: FloatArray, back: bool) -> tuple[FloatArray, FloatArray]:
+def deflect(meeting: IncidentRays, gradient: FloatArray, back: bool) -> tuple[FloatArray, FloatArray]:
     """Directions behind a path that varies along the surface: n d + its gradient is kept in the plane.
 
     Parameters
@@ -246,7 +242,7 @@ def bent(meeting: Meeting, gradient: FloatArray, back: bool) -> tuple[FloatArray
     """
     normal, side = meeting.normal, -1.0 if back else 1.0
     facing = dot(meeting.direction, normal)
-    along = within(meeting.direction + gradient / meeting.index[:, None], normal)
+    along = tangential(meeting.direction + gradient / meeting.index[:, None], normal)
     rest = 1.0 - dot(along, along)
     possible = rest > 0.0
     rise = side * np.copysign(np.sqrt(np.where(possible, rest, 0.0)), facing)
@@ -254,16 +250,16 @@ def bent(meeting: Meeting, gradient: FloatArray, back: bool) -> tuple[FloatArray
     return np.where(possible[:, None], along + scaled(normal, rise), straight), possible.astype(np.float64)
 
 
-def sent(meeting: Meeting, direction: FloatArray, back: bool) -> ComplexArray:
+def onward_fields(meeting: IncidentRays, direction: FloatArray, back: bool) -> ComplexArray:
     """Fields that go on in new directions; those sent back are turned over as by an ideal mirror, -1."""
     if not back:
-        return carried(meeting.field, meeting.direction, direction)
+        return rotate_fields(meeting.field, meeting.direction, direction)
     facing = dot(meeting.direction, meeting.normal)
     mirrored = meeting.direction - scaled(meeting.normal, 2.0 * facing)
     field = meeting.field
     if field.ndim == 2:
         field = field - scaled(meeting.normal, 2.0 * dot(field, meeting.normal))
-    return carried(-field, mirrored, direction)
+    return rotate_fields(-field, mirrored, direction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,15 +293,15 @@ class Annulus:
         if not (all(isinstance(r, Real) for r in radii) and 0.0 <= self.inner < self.outer):
             raise ValueError(f"Annulus radii: expected 0 <= inner < outer in metres, got {radii}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """The light between the radii; see `Element`."""
-        radius = np.linalg.norm(within(meeting.point - self.centre, meeting.normal), axis=1)
+        radius = np.linalg.norm(tangential(meeting.point - self.centre, meeting.normal), axis=1)
         passes = (radius >= self.inner) & (radius <= self.outer)
         return (Branch(scaled(meeting.field, passes)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Annulus:
         """The stop turned about the origin, then shifted; as `Mesh.moved`."""
-        return Annulus(shifted(self.centre, offset, turn), self.inner, self.outer)
+        return Annulus(move_point(self.centre, offset, turn), self.inner, self.outer)
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,7 +353,7 @@ class IdealLens:
         if not isinstance(distance, Real) or np.isnan(distance) or distance == 0.0:
             raise ValueError(f"IdealLens object distance: expected a length other than 0, got {distance!r}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """The light bent towards the image; see `Element`."""
         facing = component(meeting.direction, self.axis)
         forward = facing > 0.0
@@ -375,7 +371,7 @@ class IdealLens:
         met &= size > 0.0
         direction = np.where(met[:, None], out / np.where(met, size, 1.0)[:, None], meeting.direction)
         path = self._path(q, chief, near, far) * meeting.index
-        field = scaled(carried(meeting.field, meeting.direction, direction), met)
+        field = scaled(rotate_fields(meeting.field, meeting.direction, direction), met)
         return (Branch(field, direction, None, np.where(met, path, 0.0)),)
 
     @staticmethod
@@ -394,5 +390,5 @@ class IdealLens:
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> IdealLens:
         """The lens turned about the origin, then shifted; as `Mesh.moved`."""
-        centre = shifted(self.centre, offset, turn)
-        return IdealLens(centre, turned(self.axis, turn), self.focal_length, self.object_distance)
+        centre = move_point(self.centre, offset, turn)
+        return IdealLens(centre, rotate_vector(self.axis, turn), self.focal_length, self.object_distance)

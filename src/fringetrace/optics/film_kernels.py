@@ -24,7 +24,7 @@ def normal(index, sine2):
 
 
 @jit
-def across(index, sine2, thickness, k0):
+def layer_matrix(index, sine2, thickness, k0):
     """Matrix of a layer, times p = exp(i k0 kz d): its diagonal, i sin / kz, i kz sin, and p.
 
     In terms of p, which cannot overflow, and of a quotient that stays finite at kz = 0.
@@ -44,7 +44,7 @@ def across(index, sine2, thickness, k0):
 
 
 @jit
-def stack(sine2, first, layers, thickness, last, k0):
+def stack_amplitudes(sine2, first, layers, thickness, last, k0):
     """Amplitudes (rs, rp, ts, tp) of a stack of layers between two half spaces.
 
     sine2 = (n sin(theta))^2 of the first half space, the same all through the stack; `first`,
@@ -59,7 +59,7 @@ def stack(sine2, first, layers, thickness, last, k0):
     es, hs, gs = 1.0 + 0j, kz2, 1.0 + 0j
     hp, ep, gp = 1.0 + 0j, kz2 / (last * last), 1.0 + 0j
     for j in range(len(layers) - 1, -1, -1):
-        middle, quotient, product, p = across(layers[j], sine2, thickness[j], k0)
+        middle, quotient, product, p = layer_matrix(layers[j], sine2, thickness[j], k0)
         w = layers[j] * layers[j]
         es, hs = middle * es + quotient * hs, product * es + middle * hs
         hp, ep = middle * hp + w * quotient * ep, product / w * hp + middle * ep
@@ -78,7 +78,7 @@ def stack(sine2, first, layers, thickness, last, k0):
 
 
 @jit
-def carried(sine2, first, last):
+def power_factors(sine2, first, last):
     """Power across a face or film for |t|^2 = 1, of s and of p light: T = carried * |t|^2.
 
     The normal part of the Poynting vector behind, by that before; T = 0 where light is totally
@@ -93,10 +93,10 @@ def carried(sine2, first, last):
 
 @jit
 def stacks(sine2, first, layers, thickness, last, k0):
-    """`stack` for arrays (k,) of sine2, first, last, k0, and (k, m) of layers: (4, k) amplitudes."""
+    """`stack_amplitudes` for (k,) of sine2, first, last, k0, and (k, m) of layers: (4, k) amplitudes."""
     out = np.empty((4, len(sine2)), np.complex128)
     for i in range(len(sine2)):
-        out[0, i], out[1, i], out[2, i], out[3, i] = stack(
+        out[0, i], out[1, i], out[2, i], out[3, i] = stack_amplitudes(
             sine2[i], first[i], layers[i], thickness, last[i], k0[i]
         )
     return out
@@ -104,10 +104,10 @@ def stacks(sine2, first, layers, thickness, last, k0):
 
 @jit
 def shares(sine2, first, last):
-    """`carried` for arrays (k,): (2, k)."""
+    """`power_factors` for arrays (k,): (2, k)."""
     out = np.empty((2, len(sine2)))
     for i in range(len(sine2)):
-        out[0, i], out[1, i] = carried(sine2[i], first[i], last[i])
+        out[0, i], out[1, i] = power_factors(sine2[i], first[i], last[i])
     return out
 
 
@@ -131,7 +131,7 @@ def shared(through, before):
 
 
 @part
-def fresnel(first, q1, last, q2):
+def face_amplitudes(first, q1, last, q2):
     """Fresnel's r_s, r_p, t_s, t_p, of E, from indices and normal parts n cos; signs as in `films`."""
     a, b = last * last * q1, first * first * q2
     s, p = 1.0 / (q1 + q2), 1.0 / (a + b)
@@ -179,7 +179,7 @@ def bare(first, last, q1):
     if first.imag == 0.0 and last.imag == 0.0 and q1.imag == 0.0 and q1.real > 0.0 and first != last:
         return clear(first.real, last.real, q1.real)
     q2 = beneath(first, last, q1)
-    rs, rp, ts, tp = fresnel(first, q1, last, q2)
+    rs, rp, ts, tp = face_amplitudes(first, q1, last, q2)
     s, p = powers(first, q1, last, q2)
     ts, tp = ts * s, tp * p
     if aslant(first, q1):
@@ -209,7 +209,7 @@ def coated(film, surface, front, first, last, q1, k0):
     a, b = begin[surface], begin[surface + 1]
     layers = indices[a:b] if front else backwards[0][a:b]
     depth = thickness[a:b] if front else backwards[1][a:b]
-    rs, rp, ts, tp = stack(first * first - q1 * q1, first, layers, depth, last, k0)
+    rs, rp, ts, tp = stack_amplitudes(first * first - q1 * q1, first, layers, depth, last, k0)
     s, p = powers(first, q1, last, q2)
     ts, tp = ts * s, tp * p
     if aslant(first, q1):

@@ -28,7 +28,7 @@ class Amplitudes(NamedTuple):
     tp: ComplexArray
 
 
-class Powers(NamedTuple):
+class PolarisedPowers(NamedTuple):
     """Fractions of the power of s and of p light; arrays of one shape."""
 
     s: FloatArray
@@ -201,7 +201,7 @@ def reflectance(
     last: Material | complex | str,
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
-) -> Powers:
+) -> PolarisedPowers:
     """Fraction of the power that a film reflects, |r|^2; arguments as in `coefficients`.
 
     Returns
@@ -210,7 +210,7 @@ def reflectance(
         s and p, float64 of the broadcast shape.
     """
     amplitudes = coefficients(film, first, last, angle, wavelength)
-    return Powers(np.abs(amplitudes.rs) ** 2, np.abs(amplitudes.rp) ** 2)
+    return PolarisedPowers(np.abs(amplitudes.rs) ** 2, np.abs(amplitudes.rp) ** 2)
 
 
 def transmittance(
@@ -219,7 +219,7 @@ def transmittance(
     last: Material | complex | str,
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
-) -> Powers:
+) -> PolarisedPowers:
     """Fraction of the power that gets behind a film; arguments as in `coefficients`.
 
     Returns
@@ -232,7 +232,7 @@ def transmittance(
     shape, wave = _incidence(film, first, last, angle, wavelength)
     amplitudes = coefficients(film, first, last, angle, wavelength)
     s, p = shares(wave["sine2"], wave["first"], wave["last"]).reshape(2, *shape)
-    return Powers(s * np.abs(amplitudes.ts) ** 2, p * np.abs(amplitudes.tp) ** 2)
+    return PolarisedPowers(s * np.abs(amplitudes.ts) ** 2, p * np.abs(amplitudes.tp) ** 2)
 
 
 def fresnel(first: npt.ArrayLike, last: npt.ArrayLike, angle: npt.ArrayLike) -> Amplitudes:

@@ -16,20 +16,19 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction, checked_vector
+from fringetrace.core import FloatArray, checked_direction, checked_vector, dot
 from fringetrace.optics.elements import (
     Branch,
-    Meeting,
+    IncidentRays,
     Waves,
-    asked,
-    bent,
-    checked_length,
-    dot,
-    lying,
+    deflect,
+    move_point,
+    onward_fields,
+    positive_length,
+    required_wavelength,
+    rotate_vector,
     scaled,
-    sent,
-    shifted,
-    turned,
+    tangential_axis,
 )
 
 # Orders may not carry more power than came; rounding is allowed for.
@@ -105,36 +104,38 @@ class Grating:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Grating centre"))
         object.__setattr__(self, "orders", checked_orders(self.orders, "Grating"))
         object.__setattr__(self, "amplitudes", _checked_amplitudes(self.amplitudes, len(self.orders)))
-        checked_length(self.period, "Grating period")
+        positive_length(self.period, "Grating period")
 
     @property
     def branches(self) -> int:
         """One for each order."""
         return len(self.orders)
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """The orders; see `Element`."""
         assert self.amplitudes is not None
-        lie = lying(self.axis, meeting.normal, "Grating axis")
+        lie = tangential_axis(self.axis, meeting.normal, "Grating axis")
         along = dot(meeting.point - self.centre, lie)
-        step = asked(meeting.wavelength, "Grating") / self.period
+        step = required_wavelength(meeting.wavelength, "Grating") / self.period
         return tuple(
-            diffracted(meeting, lie * (m * step), along * (m * step), amplitude, self.reflects)
+            diffracted_branch(meeting, lie * (m * step), along * (m * step), amplitude, self.reflects)
             for m, amplitude in zip(self.orders, self.amplitudes, strict=True)
         )
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Grating:
         """The grating turned about the origin, then shifted; as `Mesh.moved`."""
-        centre = shifted(np.asarray(self.centre), offset, turn)
-        return replace(self, axis=turned(self.axis, turn), centre=centre)
+        centre = move_point(np.asarray(self.centre), offset, turn)
+        return replace(self, axis=rotate_vector(self.axis, turn), centre=centre)
 
 
-def diffracted(
-    meeting: Meeting, gradient: FloatArray, path: FloatArray, amplitude: complex, reflects: bool
+def diffracted_branch(
+    meeting: IncidentRays, gradient: FloatArray, path: FloatArray, amplitude: complex, reflects: bool
 ) -> Branch:
     """The branch behind a path and its gradient (n, 3), times an amplitude."""
-    direction, possible = bent(meeting, gradient, reflects)
-    return Branch(scaled(amplitude * sent(meeting, direction, reflects), possible), direction, None, path)
+    direction, possible = deflect(meeting, gradient, reflects)
+    return Branch(
+        scaled(amplitude * onward_fields(meeting, direction, reflects), possible), direction, None, path
+    )
 
 
 def lamellar(orders: Iterable[int], phase: float, fill: float = 0.5) -> tuple[complex, ...]:
@@ -181,7 +182,7 @@ def sinusoidal(orders: Iterable[int], phase: float) -> tuple[complex, ...]:
     return tuple(1j ** (m % 4) * complex(jv(m, phase)) for m in orders)
 
 
-def blazed(order: int, waves: float) -> complex:
+def blazed_amplitude(order: int, waves: float) -> complex:
     """Amplitude of an order of a blazed grating that is so many waves deep.
 
     Parameters

@@ -201,7 +201,7 @@ def reflect(direction: FloatArray, normal: FloatArray) -> FloatArray:
     return np.asarray(direction - 2.0 * along[:, None] * normal, dtype=np.float64)
 
 
-def refracted(direction: FloatArray, normal: FloatArray, before: float, behind: float) -> FloatArray:
+def refract(direction: FloatArray, normal: FloatArray, before: float, behind: float) -> FloatArray:
     """Direction after refraction, by Snell's law: what runs along the surface stays the same.
 
     Parameters

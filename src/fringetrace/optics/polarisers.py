@@ -14,21 +14,20 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_direction
+from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot
 from fringetrace.optics.elements import (
     Branch,
-    Index,
-    Meeting,
+    IncidentRays,
+    RealIndex,
     Waves,
-    across,
-    asked,
     checked_index,
-    checked_length,
     checked_number,
-    dot,
     index_at,
+    positive_length,
+    required_wavelength,
+    rotate_vector,
     scaled,
-    turned,
+    transverse_axis,
     vectors_of,
 )
 
@@ -66,13 +65,13 @@ class Polariser:
         if not 0.0 <= checked_number(self.extinction, "Polariser extinction") <= 1.0:
             raise ValueError(f"Polariser extinction: expected a number from 0 to 1, got {self.extinction!r}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """The component along the axis; see `Element`."""
-        return (Branch(weighed(meeting, "Polariser", self.axis, 1.0, self.extinction**0.5)),)
+        return (Branch(scale_components(meeting, "Polariser", self.axis, 1.0, self.extinction**0.5)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Polariser:
         """The polariser turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +112,7 @@ class Retarder:
                 f"Retarder design: expected None beside a function of the wavelength, got {self.design}"
             )
         if self.design is not None:
-            checked_length(self.design, "Retarder design")
+            positive_length(self.design, "Retarder design")
 
     @property
     def chromatic(self) -> bool:
@@ -137,17 +136,19 @@ class Retarder:
             If it depends on the wavelength, and that is None.
         """
         if callable(self.retardance):
-            return float(self.retardance(asked(wavelength, "Retarder")))
-        return self.retardance * (self.design / asked(wavelength, "Retarder") if self.design else 1.0)
+            return float(self.retardance(required_wavelength(wavelength, "Retarder")))
+        return self.retardance * (
+            self.design / required_wavelength(wavelength, "Retarder") if self.design else 1.0
+        )
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """Both components, one of them delayed; see `Element`."""
         delay = complex(np.exp(1j * self.at(meeting.wavelength)))
-        return (Branch(weighed(meeting, "Retarder", self.axis, delay, 1.0)),)
+        return (Branch(scale_components(meeting, "Retarder", self.axis, delay, 1.0)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Retarder:
         """The retarder turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 @dataclass(frozen=True)
@@ -166,14 +167,14 @@ class Birefringence:
         If an index or the thickness is not positive.
     """
 
-    ordinary: Index
-    extraordinary: Index
+    ordinary: RealIndex
+    extraordinary: RealIndex
     thickness: float
 
     def __post_init__(self) -> None:
         checked_index(self.ordinary, "Birefringence ordinary index")
         checked_index(self.extraordinary, "Birefringence extraordinary index")
-        checked_length(self.thickness, "Birefringence thickness")
+        positive_length(self.thickness, "Birefringence thickness")
 
     def __call__(self, wavelength: float) -> float:
         """Retardance in radians at a wavelength in metres."""
@@ -230,11 +231,11 @@ class JonesPlate:
         object.__setattr__(self, "matrix", _checked_matrix(self.matrix))
         object.__setattr__(self, "axis", checked_direction(self.axis, "JonesPlate axis"))
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """The field times the matrix; see `Element`."""
         field = vectors_of(meeting, "JonesPlate")
         behind = dot(meeting.direction, meeting.normal) > 0.0
-        first = across(self.axis, meeting.direction)
+        first = transverse_axis(self.axis, meeting.direction)
         second = scaled(np.cross(meeting.direction, first), np.where(behind, -1.0, 1.0))
         a, b = dot(field, first), dot(field, second)
         m = self.matrix
@@ -243,7 +244,7 @@ class JonesPlate:
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> JonesPlate:
         """The plate turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 def _checked_matrix(value: Any) -> ComplexArray:
@@ -259,8 +260,10 @@ def _checked_matrix(value: Any) -> ComplexArray:
     return matrix
 
 
-def weighed(meeting: Meeting, what: str, axis: FloatArray, along: complex, rest: complex) -> ComplexArray:
+def scale_components(
+    meeting: IncidentRays, what: str, axis: FloatArray, along: complex, rest: complex
+) -> ComplexArray:
     """Fields with their component along an axis times one number, and the rest times another."""
     field = vectors_of(meeting, what)
-    seen = across(axis, meeting.direction)
+    seen = transverse_axis(axis, meeting.direction)
     return np.asarray(rest * field + scaled(seen, (along - rest) * dot(field, seen)))

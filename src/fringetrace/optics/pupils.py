@@ -8,8 +8,16 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction
-from fringetrace.optics.elements import Branch, Meeting, Waves, checked_number, dot, scaled, turned, within
+from fringetrace.core import FloatArray, checked_direction, dot
+from fringetrace.optics.elements import (
+    Branch,
+    IncidentRays,
+    Waves,
+    checked_number,
+    rotate_vector,
+    scaled,
+    tangential,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +51,12 @@ class Pupil:
         if not checked_number(self.aperture, "Pupil aperture") > 0.0:
             raise ValueError(f"Pupil aperture: expected a positive number, got {self.aperture!r}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
         """The light within the aperture; see `Element`."""
-        aside = within(meeting.direction, np.broadcast_to(self.axis, meeting.direction.shape))
+        aside = tangential(meeting.direction, np.broadcast_to(self.axis, meeting.direction.shape))
         passes = meeting.index**2 * dot(aside, aside) <= self.aperture**2
         return (Branch(scaled(meeting.field, passes)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Pupil:
         """The pupil turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        return replace(self, axis=rotate_vector(self.axis, turn))

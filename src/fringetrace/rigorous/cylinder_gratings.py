@@ -22,13 +22,13 @@ from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.rigorous.cylindrical_waves import (
     Index,
     Polarisation,
-    at_wavelength,
     boundary,
     check_polarisation,
+    indices_at,
     lattice_sums,
     truncation,
 )
-from fringetrace.rigorous.effective_medium import Powers, effective_index, stack
+from fringetrace.rigorous.effective_medium import SlabPowers, effective_index, stack_powers
 
 _SLICES = 64  # flat layers a pitch, of method "multilayer"
 _EVANESCENT = 7  # diffraction orders beyond those that propagate: reciprocity then holds to 1e-11
@@ -56,7 +56,7 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Lattice:
+class CylinderGratings:
     """Rows of cylinders in a host slab between a front and a back half-space.
 
     Attributes
@@ -148,8 +148,8 @@ class _Light(NamedTuple):
 
 
 def diffract(
-    lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike = 0.0, polarisation: Polarisation = "E",
-    orders: int | None = None, harmonics: int | None = None,
+    lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike = 0.0,
+    polarisation: Polarisation = "E", orders: int | None = None, harmonics: int | None = None,
 ) -> Diffraction:  # fmt: skip
     """A plane wave from the front on a lattice.
 
@@ -205,11 +205,11 @@ def diffract(
     )  # fmt: skip
 
 
-def spectrum(
-    lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike = 0.0,
+def reflectance_spectrum(
+    lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike = 0.0,
     polarisation: Polarisation | Literal["unpolarised"] = "unpolarised",
     method: str = "rods",
-) -> Powers:  # fmt: skip
+) -> SlabPowers:  # fmt: skip
     """Reflectance and transmittance of a lattice, all diffraction orders together.
 
     Parameters
@@ -234,30 +234,32 @@ def spectrum(
         If the method or the polarisation is unknown.
     """
     if polarisation == "unpolarised":
-        e = spectrum(lattice, wavelength, angle, "E", method)
-        h = spectrum(lattice, wavelength, angle, "H", method)
-        return Powers((e.reflectance + h.reflectance) / 2.0, (e.transmittance + h.transmittance) / 2.0)
+        e = reflectance_spectrum(lattice, wavelength, angle, "E", method)
+        h = reflectance_spectrum(lattice, wavelength, angle, "H", method)
+        return SlabPowers((e.reflectance + h.reflectance) / 2.0, (e.transmittance + h.transmittance) / 2.0)
     check_polarisation(polarisation)
     if method == "multilayer":
         return _blurred(lattice, wavelength, angle, polarisation)
     if method != "rods":
         raise ValueError(f"Method: expected 'rods' or 'multilayer', got {method!r}")
     found = diffract(lattice, wavelength, angle, polarisation)
-    return Powers(found.reflectance.sum(-1), found.transmittance.sum(-1))
+    return SlabPowers(found.reflectance.sum(-1), found.transmittance.sum(-1))
 
 
-def _blurred(lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike, polarisation: Polarisation) -> Powers:
+def _blurred(
+    lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike, polarisation: Polarisation
+) -> SlabPowers:
     """Powers of the lattice as a stack of thin flat layers of effective index."""
     wavelength, angle = np.broadcast_arrays(np.asarray(wavelength, np.float64), np.asarray(angle, np.float64))
     front, host, back = _media(lattice, wavelength)
     faces = np.linspace(0.0, lattice.thickness, math.ceil(_SLICES * lattice.thickness / lattice.pitch) + 1)
     fractions = [_filling(row, lattice.pitch, faces) for row in lattice.rows]
     fractions.append(1.0 - np.sum(fractions, 0) * np.ones(len(faces) - 1))
-    indices = [*(at_wavelength(row.index, wavelength) for row in lattice.rows), host]
+    indices = [*(indices_at(row.index, wavelength) for row in lattice.rows), host]
     if not np.all(np.isfinite(indices)):
         raise ValueError("Method 'multilayer': expected finite refractive indices, got a perfect conductor")
     mixed = effective_index(np.stack(fractions, -1), np.stack(indices, -1)[..., None, :], polarisation)
-    return stack(np.diff(faces), mixed, front, back, wavelength, angle, polarisation)
+    return stack_powers(np.diff(faces), mixed, front, back, wavelength, angle, polarisation)
 
 
 def _filling(row: Row, pitch: float, faces: FloatArray) -> FloatArray:
@@ -268,12 +270,14 @@ def _filling(row: Row, pitch: float, faces: FloatArray) -> FloatArray:
     return found
 
 
-def _media(lattice: Lattice, wavelength: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+def _media(
+    lattice: CylinderGratings, wavelength: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Index of front, host and back at each wavelength."""
     if not np.all(wavelength > 0):
         raise ValueError(f"Wavelength: expected positive lengths in metres, got {wavelength.min()}")
     behind = lattice.host if lattice.back is None else lattice.back
-    front, host, back = (at_wavelength(index, wavelength) for index in (lattice.front, lattice.host, behind))
+    front, host, back = (indices_at(index, wavelength) for index in (lattice.front, lattice.host, behind))
     for name, index in (("Front", front), ("Host", host)):
         if not (np.all(index.real > 0) and np.all(index.imag == 0)):
             raise ValueError(f"{name}: expected a positive real refractive index, got {index}")
@@ -300,7 +304,7 @@ def _row(
     """A row of cylinders, phases at its axis."""
     k = (host.real * light.vacuum)[..., None]
     gamma = light.across(host)
-    index = at_wavelength(row.index, wavelength)
+    index = indices_at(row.index, wavelength)
     response, weight, _ = boundary(row.radius, index, host.real, wavelength, light.polarisation, harmonics)
     n = np.arange(-harmonics, harmonics + 1)
     sums = lattice_sums(light.beta[..., light.beta.shape[-1] // 2], k[..., 0], pitch, 2 * harmonics)

@@ -25,9 +25,9 @@ from fringetrace.rigorous.cylindrical_waves import (
     CONDUCTOR as CONDUCTOR,
     Index,
     Polarisation,
-    at_wavelength,
     boundary,
     hankel,
+    indices_at,
     truncation,
 )
 from fringetrace.rigorous.multiple_scattering import solve
@@ -115,7 +115,7 @@ class Scattered:
         return np.arange(-half, half + 1)
 
 
-def coefficients(
+def scattering_coefficients(
     radius: ArrayLike, index: ArrayLike, host: float, wavelength: ArrayLike, polarisation: Polarisation,
     orders: int,
 ) -> ComplexArray:  # fmt: skip
@@ -146,10 +146,10 @@ def efficiencies(
 ) -> Widths:
     """Efficiencies of one cylinder: extinction, scattering, absorption widths over its diameter.
 
-    Arguments as in `coefficients`; Bohren and Huffman, eq. 8.36.
+    Arguments as in `scattering_coefficients`; Bohren and Huffman, eq. 8.36.
     """
     size = 2.0 * math.pi * host * radius / wavelength
-    found = coefficients(radius, index, host, wavelength, polarisation, truncation(size))
+    found = scattering_coefficients(radius, index, host, wavelength, polarisation, truncation(size))
     extinction = -2.0 / size * found.real.sum(-1)
     scattering = 2.0 / size * (abs(found) ** 2).sum(-1)
     return Widths(extinction, scattering, extinction - scattering)
@@ -316,7 +316,7 @@ def _incident(cylinders: Cylinders, k: float, angle: FloatArray, orders: int) ->
 
 def _wavenumber(cylinders: Cylinders, wavelength: float) -> float:
     """Wave number in the host, 1/m."""
-    host = complex(at_wavelength(cylinders.host, np.asarray(wavelength)))
+    host = complex(indices_at(cylinders.host, np.asarray(wavelength)))
     if not (host.real > 0 and host.imag == 0):
         raise ValueError(f"Host: expected a positive real refractive index, got {host}")
     return 2.0 * math.pi * host.real / wavelength
@@ -325,7 +325,7 @@ def _wavenumber(cylinders: Cylinders, wavelength: float) -> float:
 def _indices(cylinders: Cylinders, wavelength: float) -> ComplexArray:
     """Refractive index of each cylinder at a wavelength, (n,) complex128."""
     several = cylinders.index if isinstance(cylinders.index, Sequence) else [cylinders.index]
-    values = [at_wavelength(index, np.asarray(wavelength)) for index in several]
+    values = [indices_at(index, np.asarray(wavelength)) for index in several]
     return np.broadcast_to(np.asarray(values, np.complex128), (len(np.asarray(cylinders.centres)),))
 
 

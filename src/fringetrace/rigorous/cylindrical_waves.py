@@ -31,7 +31,7 @@ def truncation(size_parameter: float) -> int:
     return math.ceil(size_parameter + 6.0 * math.cbrt(size_parameter) + 2.0)
 
 
-def at_wavelength(index: Index, wavelength: FloatArray) -> ComplexArray:
+def indices_at(index: Index, wavelength: FloatArray) -> ComplexArray:
     """Refractive index at each of some wavelengths in metres, complex128 of their shape."""
     value = index(wavelength) if callable(index) else index
     return np.broadcast_to(np.asarray(value, np.complex128), wavelength.shape)
@@ -119,7 +119,7 @@ def hankel(argument: FloatArray, orders: int) -> ComplexArray:
     return np.concatenate([sign * positive[..., :0:-1], positive], -1)
 
 
-def waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
+def outgoing_waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
     """H_l(k R) exp(i l phi) of orders -N to N at displacements (..., 2), zero at displacement zero."""
     distance = np.hypot(displacement[..., 0], displacement[..., 1])
     here = distance == 0.0

@@ -15,7 +15,7 @@ from fringetrace.rigorous.cylindrical_waves import Polarisation, check_polarisat
 EXPONENT: dict[Polarisation, float] = {"E": 2.5, "H": -1.5}
 
 
-class Powers(NamedTuple):
+class SlabPowers(NamedTuple):
     """Reflected and transmitted power over incident power, (...,) float64 each."""
 
     reflectance: FloatArray
@@ -46,10 +46,10 @@ def effective_index(fraction: FloatArray, index: ComplexArray, polarisation: Pol
     return found
 
 
-def stack(
+def stack_powers(
     thickness: ArrayLike, index: ArrayLike, front: ArrayLike, back: ArrayLike, wavelength: ArrayLike,
     angle: ArrayLike, polarisation: Polarisation,
-) -> Powers:  # fmt: skip
+) -> SlabPowers:  # fmt: skip
     """Reflectance and transmittance of flat layers, see `films`, each of its own index at each wavelength.
 
     Parameters
@@ -85,4 +85,4 @@ def stack(
     which = 0 if polarisation == "E" else 1
     reflected, transmitted = abs(amplitudes[[which, 2 + which]]) ** 2
     passed = shares(sine2, first, last)[which] * transmitted
-    return Powers(reflected.reshape(shape), passed.reshape(shape))
+    return SlabPowers(reflected.reshape(shape), passed.reshape(shape))

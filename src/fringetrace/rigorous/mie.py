@@ -22,7 +22,7 @@ class Efficiencies(NamedTuple):
     asymmetry: float
 
 
-def coefficients(
+def mie_coefficients(
     radius: float, index: complex, host: float, wavelength: float
 ) -> tuple[ComplexArray, ComplexArray]:
     """Mie coefficients a_n and b_n, n = 1 to N.
@@ -66,8 +66,8 @@ def coefficients(
 
 
 def efficiencies(radius: float, index: complex, host: float, wavelength: float) -> Efficiencies:
-    """Efficiencies of one sphere; arguments as in `coefficients`."""
-    a, b = coefficients(radius, index, host, wavelength)
+    """Efficiencies of one sphere; arguments as in `mie_coefficients`."""
+    a, b = mie_coefficients(radius, index, host, wavelength)
     x, n = 2.0 * math.pi * host * radius / wavelength, np.arange(1, len(a) + 1)
     weight = 2 * n + 1
     extinction = 2.0 / x**2 * (weight * (a + b).real).sum()
@@ -79,7 +79,7 @@ def efficiencies(radius: float, index: complex, host: float, wavelength: float) 
     return Efficiencies(*map(float, (extinction, scattering, extinction - scattering, back, asymmetry)))
 
 
-def amplitudes(
+def amplitude_functions(
     radius: float, index: complex, host: float, wavelength: float, angle: ArrayLike
 ) -> tuple[ComplexArray, ComplexArray]:
     """Amplitudes S1 (across the scattering plane) and S2 (in it) at scattering angles.
@@ -89,7 +89,7 @@ def amplitudes(
     Parameters
     ----------
     radius, index, host, wavelength
-        As in `coefficients`.
+        As in `mie_coefficients`.
     angle : (t,) float64, radians
         From the forward direction.
 
@@ -97,7 +97,7 @@ def amplitudes(
     -------
     S1, S2 : (t,) complex128
     """
-    a, b = coefficients(radius, index, host, wavelength)
+    a, b = mie_coefficients(radius, index, host, wavelength)
     cosine = np.cos(np.atleast_1d(np.asarray(angle, np.float64)))
     pi, tau = _angular(cosine, len(a))
     n = np.arange(1, len(a) + 1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fringetrace.rigorous.cylindrical_waves import Index, at_wavelength
+from fringetrace.rigorous.cylindrical_waves import Index, indices_at
 
 # Laws of rays against the rigorous answer, k a = 8 to 250, fitted in docs/rigorous.md
 _OPAQUE = 2.4  # over k a: light that two conducting discs reflect
@@ -77,7 +77,7 @@ def validity(radius: float, wavelength: float, index: Index, host: Index = 1.0) 
         raise ValueError(
             f"Validity: expected positive lengths in metres, got radius {radius}, wavelength {wavelength}"
         )
-    within, around = (complex(at_wavelength(v, np.asarray(wavelength))) for v in (index, host))
+    within, around = (complex(indices_at(v, np.asarray(wavelength))) for v in (index, host))
     size = 2.0 * math.pi * around.real * radius / wavelength
     phase = 2.0 * size * (within.real / around.real - 1.0)
     opaque = math.isinf(within.real) or math.exp(-8.0 * math.pi * within.imag * radius / wavelength) < _DARK

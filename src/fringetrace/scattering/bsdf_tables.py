@@ -25,7 +25,7 @@ SELDOM = 1e-3
 GRAZING = 1e-6
 
 
-def table(
+def brdf_table(
     values: npt.ArrayLike,
     theta_i: npt.ArrayLike,
     phi_i: npt.ArrayLike,
@@ -96,8 +96,8 @@ def lookup(brdf: DataArray, incident: npt.ArrayLike, outgoing: npt.ArrayLike) ->
     Parameters
     ----------
     brdf : xarray.DataArray
-        (theta_i, phi_i, theta_o, phi_o, anything), as of `table`. If phi_i is a single angle the surface is
-        isotropic: only phi_o - phi_i counts.
+        (theta_i, phi_i, theta_o, phi_o, anything), as of `brdf_table`. If phi_i is a single angle the surface
+        is isotropic: only phi_o - phi_i counts.
     incident, outgoing : (..., 3) array-like
         To the light and to the eye, unit vectors, z along the surface's normal.
 
@@ -138,7 +138,7 @@ def lookup(brdf: DataArray, incident: npt.ArrayLike, outgoing: npt.ArrayLike) ->
     return np.asarray(found * above[..., None])
 
 
-def sphere(brdf: DataArray, light: npt.ArrayLike = (0.0, 0.0, 1.0), pixels: int = 256) -> FloatArray:
+def shaded_sphere(brdf: DataArray, light: npt.ArrayLike = (0.0, 0.0, 1.0), pixels: int = 256) -> FloatArray:
     """A sphere under one distant light, seen from far away along z: radiance over irradiance.
 
     Parameters
@@ -200,7 +200,7 @@ def mitsuba(
     Parameters
     ----------
     brdf : xarray.DataArray
-        As of `table`, resampled by `lookup`; a single phi_i is an isotropic surface.
+        As of `brdf_table`, resampled by `lookup`; a single phi_i is an isotropic surface.
     path : path
         The file is there in full or not at all.
     pixels : int, at least 2

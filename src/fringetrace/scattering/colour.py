@@ -21,12 +21,12 @@ from fringetrace.core import (
 )
 
 __all__ = [
-    "chromaticity", "illuminant", "lab", "load", "luminance", "observer", "samples", "save", "srgb",
-    "weights", "white", "xyz",
+    "chromaticity", "illuminant", "lab", "load", "luminance", "observer", "resolving_wavelengths", "save",
+    "srgb", "weights", "white", "xyz",
 ]  # fmt: skip
 
 # A lamp by name, or as wavelengths (metres) and relative power.
-Light = str | tuple[npt.ArrayLike, npt.ArrayLike]
+Illuminant = str | tuple[npt.ArrayLike, npt.ArrayLike]
 
 # The CIE's observers run from 360 to 830 nm; lamps are tabulated every 5 nm. One step of zeros at both
 # ends makes the trapezium rule the CIE's plain sum.
@@ -98,7 +98,7 @@ def _tabulated(name: str) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def illuminant(light: Light, wavelengths: npt.ArrayLike) -> FloatArray:
+def illuminant(light: Illuminant, wavelengths: npt.ArrayLike) -> FloatArray:
     """Relative spectral power of a lamp, 100 at 560 nm for those of the CIE, per wavelength.
 
     Parameters
@@ -177,7 +177,7 @@ def _spread(points: FloatArray, values: FloatArray, samples: FloatArray) -> Floa
     return weights
 
 
-def _sums(samples: FloatArray, light: Light | None, degrees: int) -> FloatArray:
+def _sums(samples: FloatArray, light: Illuminant | None, degrees: int) -> FloatArray:
     """(n, 3): samples (nm) times these add up to the integrals of x, y, z times light, over nm."""
     inside = samples[(samples > FIRST) & (samples < LAST)]
     points = np.union1d(np.arange(FIRST - STEP, LAST + 2.0 * STEP, STEP), inside)
@@ -187,7 +187,7 @@ def _sums(samples: FloatArray, light: Light | None, degrees: int) -> FloatArray:
     return _spread(points, observer(degrees, points * nm) * (widths * power)[:, None], samples)
 
 
-def weights(wavelengths: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2) -> FloatArray:
+def weights(wavelengths: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
     """Tristimulus weights: X, Y, Z of a reflectance are its samples times these.
 
     The integral is a sum over the CIE's 5 nm and all samples together (trapezium rule); between its
@@ -219,7 +219,7 @@ def weights(wavelengths: npt.ArrayLike, illuminant: Light = "D65", observer: int
     return np.asarray(sums / brightness)
 
 
-def samples(path: float = 0.0) -> FloatArray:
+def resolving_wavelengths(path: float = 0.0) -> FloatArray:
     """Wavelengths that resolve the fringes of an optical path difference.
 
     Parameters
@@ -261,7 +261,7 @@ def _warn(values: FloatArray, samples: FloatArray, weights: FloatArray) -> None:
 
 
 def xyz(
-    reflectance: npt.ArrayLike, wavelengths: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2
+    reflectance: npt.ArrayLike, wavelengths: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2
 ) -> FloatArray:
     """Tristimulus values of reflectances (or transmittances): what reflects everything has Y = 1.
 
@@ -304,9 +304,9 @@ def xyz(
     return np.asarray(values @ sums)
 
 
-def white(illuminant: Light = "D65", observer: int = 2) -> FloatArray:
+def white(illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
     """XYZ of what reflects all of the light of a lamp: (3,) float64, with Y = 1."""
-    return np.asarray(weights(samples(), illuminant, observer).sum(axis=0))
+    return np.asarray(weights(resolving_wavelengths(), illuminant, observer).sum(axis=0))
 
 
 def luminance(radiance: npt.ArrayLike, wavelengths: npt.ArrayLike, observer: int = 2) -> FloatArray:
@@ -345,7 +345,7 @@ def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
     return np.where(lit, values[..., :2] / np.where(lit, total, 1.0), np.nan)
 
 
-def lab(xyz: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2) -> FloatArray:
+def lab(xyz: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
     """CIE 1976 L*a*b*.
 
     Parameters
@@ -362,7 +362,7 @@ def lab(xyz: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2) -> Flo
     return np.asarray(colour.XYZ_to_Lab(np.asarray(xyz), chromaticity(white(illuminant, observer))))
 
 
-def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Light = "D65") -> FloatArray:
+def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Illuminant = "D65") -> FloatArray:
     """Colours on an sRGB screen (IEC 61966-2-1).
 
     Parameters

@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
+from fringetrace.geometry import IndexArray
 from fringetrace.scene import CCD
 from fringetrace.tracing import Fate, Paths, project
 
-IndexArray = npt.NDArray[np.int64]
 # Of each direction: which paths arrive, and their optical lengths in metres.
-Arrivals = Iterator[tuple[IndexArray, FloatArray]]
+DirectionPaths = Iterator[tuple[IndexArray, FloatArray]]
 
 
 def towards(theta: npt.ArrayLike, phi: npt.ArrayLike) -> FloatArray:
@@ -108,7 +108,7 @@ class Detector(Protocol):
     def projected(self) -> FloatArray:
         """(theta, phi) float64, sr: the same, weighted with cos(theta)."""
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """Direction by direction, theta-major: numbers of the paths that arrive, and their lengths."""
 
 
@@ -182,7 +182,7 @@ class Cones:
         disc = np.pi * np.sin(self.half_angle) ** 2 * np.cos(self.theta)
         return np.repeat(disc[:, None], len(self.phi), axis=1)
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """See `Detector`; a ray may be in several cones, or in none."""
         rows = _exits(paths)
         direction = paths.direction[rows]
@@ -234,7 +234,7 @@ class Cells:
         """(theta, phi) float64, sr; they add up to pi."""
         return self._rings(0.5 * np.sin(np.linspace(0.0, 0.5 * np.pi, self.rings + 1)) ** 2)
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """See `Detector`; each ray that leaves upwards is in one cell."""
         rows = _exits(paths)
         x, y, z = paths.direction[rows].T
@@ -291,7 +291,7 @@ class Pixels:
         """(theta, phi) float64, sr: the same times cos(theta)."""
         return self.solid_angle * np.cos(self.theta)[:, None]
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
         """See `Detector`; a ray may fall on several pixels, or on none."""
         met = paths.bounces > 0
         for theta in self.theta:
@@ -306,7 +306,7 @@ class Pixels:
         return CCD(centre + self.distance * axis, -axis, up, self.width, (1, 1))
 
 
-def everything(paths: Paths, detector: Detector, centre: FloatArray) -> Arrivals:
+def fraunhofer_paths(paths: Paths, detector: Detector, centre: FloatArray) -> DirectionPaths:
     """All paths that met something and left, towards each direction of a detector: Fraunhofer's sum.
 
     Parameters

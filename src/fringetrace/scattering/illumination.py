@@ -15,7 +15,7 @@ from fringetrace.scattering.detectors import sides, towards
 from fringetrace.scene import Beam, Scene
 from fringetrace.tracing import Rays, launch
 
-Source = Callable[[float, float], Beam | Rays]
+SourceFunction = Callable[[float, float], Beam | Rays]
 # None: light of one number a ray. A name, or amplitudes of s and p, one pair or one an incidence.
 Polarisation = str | npt.ArrayLike | None
 # Amplitudes of s and p; of several the powers' mean is taken.
@@ -61,7 +61,7 @@ def states(polarisation: Polarisation, shape: tuple[int, int]) -> list[tuple[Com
     return [(one,) for one in np.broadcast_to(given, (*shape, 2)).reshape(-1, 2)]
 
 
-def worth(scene: Scene, wavelength: float) -> Validity:
+def scene_validity(scene: Scene, wavelength: float) -> Validity:
     """What rays are worth on the smallest part of a scene, taken for a rod; see `fringetrace.validity`.
 
     Parameters
@@ -129,7 +129,7 @@ def footprint(
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
+class Illumination:
     """A sample under a goniometer: what is lit, about which centre.
 
     Parameters
@@ -156,7 +156,7 @@ class Setup:
     aperture: tuple[float, float] | None = None
     rays: tuple[int, int] = (256, 256)
     centre: npt.ArrayLike | None = None
-    source: Source | None = None
+    source: SourceFunction | None = None
 
     def __post_init__(self) -> None:
         low, high = self.bounds

@@ -23,7 +23,7 @@ MEDIA = ("rod", "host")
 
 
 @dataclass(frozen=True)
-class Lattice:
+class RodLattice:
     """Rods along y in rows across z, the topmost row highest.
 
     Without a host they stand in a vacuum. A host fills the half-space below a front face; in the scene
@@ -180,7 +180,7 @@ class Lattice:
         return Cylinders(np.concatenate([self.centres, self.channels]), radii, index, self._around)
 
     @property
-    def endless(self) -> cylinder_gratings.Lattice:
+    def endless(self) -> cylinder_gratings.CylinderGratings:
         """The same for `fringetrace.rigorous.cylinder_gratings`, with rows that never end, on the host.
 
         Raises
@@ -203,7 +203,9 @@ class Lattice:
                 cylinder_gratings.Row(float(d), self.channel, 1.0, 0.5 * (1.0 + shift) * self.pitch)
                 for d in 0.5 * (depth[1:] + depth[:-1])
             ]
-        return cylinder_gratings.Lattice(self.pitch, float(depth[0]) + 2.0 * self.radius, rows, self._around)
+        return cylinder_gratings.CylinderGratings(
+            self.pitch, float(depth[0]) + 2.0 * self.radius, rows, self._around
+        )
 
     def validity(self, wavelength: float) -> Validity:
         """What rays are worth on one of the rods, see `fringetrace.rigorous.ray_validity`.
@@ -234,7 +236,7 @@ class Lattice:
             Cylinders(np.concatenate([self.centres, self.channels]), radii, 1.0)
 
 
-def _prisms(lattice: Lattice, centres: FloatArray, radius: float, name: str) -> Mesh:
+def _prisms(lattice: RodLattice, centres: FloatArray, radius: float, name: str) -> Mesh:
     """Rods about axes (n, 2), rod after rod."""
     rod = rod_lattice(1, 1, radius, lattice.pitch, lattice.length, sides=lattice.sides)
     offset = np.insert(centres, 1, 0.0, axis=1)
@@ -244,7 +246,7 @@ def _prisms(lattice: Lattice, centres: FloatArray, radius: float, name: str) -> 
 
 
 def _surfaces(
-    lattice: Lattice, centres: FloatArray, radius: float, kind: Mirror | Dielectric,
+    lattice: RodLattice, centres: FloatArray, radius: float, kind: Mirror | Dielectric,
     media: dict[str, Any], name: str,
 ) -> list[Surface]:  # fmt: skip
     """Rods as one surface, or as true cylinders, one surface each, open at their ends."""
@@ -259,14 +261,14 @@ def _surfaces(
     ]
 
 
-def _across(lattice: Lattice) -> tuple[float, float]:
+def _across(lattice: RodLattice) -> tuple[float, float]:
     """Middle and width of the rods along x, metres."""
     x = lattice.centres[:, 0]
     low, high = x.min() - lattice.radius, x.max() + lattice.radius
     return float(0.5 * (low + high)), float(high - low)
 
 
-def _half_space(lattice: Lattice) -> list[Surface]:
+def _half_space(lattice: RodLattice) -> list[Surface]:
     """The host's front face, and black walls down to below the rods."""
     x, (width, length) = _across(lattice)[0], lattice.footprint
     low = float(lattice.centres[:, 1].min()) - lattice.radius

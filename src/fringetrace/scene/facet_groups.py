@@ -14,7 +14,7 @@ from fringetrace.scene.model import Scene, Surface
 COPLANAR = 1e-9
 
 
-def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
+def group_facets(scene: Scene) -> list[npt.NDArray[np.int64]]:
     """Which triangles of each surface are one: those in a plane, those that hang together on a form.
 
     Parameters

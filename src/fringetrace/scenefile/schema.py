@@ -26,8 +26,8 @@ from fringetrace.scenefile.toml import choice
 # Where the public dataclasses, and the functions that return one, can be named: modules of doors, or doors.
 SOURCES = (
     "optics.interfaces", "optics.elements", "optics.polarisers", "optics.birefringent", "optics.gratings",
-    "optics.phase_plates", "optics.films", "optics.materials", "geometry.forms", "geometry.shapes", "scene",
-    "instruments",
+    "optics.phase_plates", "optics.films", "optics.materials.material", "optics.materials.dispersion",
+    "geometry.forms", "geometry.shapes", "scene", "instruments",
 )  # fmt: skip
 # What annotations name that their own files import for type checkers only, and what functions return.
 NAMES: dict[str, Any] = {
@@ -181,6 +181,8 @@ def _vocabulary() -> dict[str, list[tuple[Kind, type]]]:
     found: dict[str, list[tuple[Kind, type]]] = {}
     for name, value in (pair for source in SOURCES for pair in _offered(source)):
         made = None
+        if value is Bench:  # benches are made by the functions that return one
+            continue
         if inspect.isclass(value) and dataclasses.is_dataclass(value):
             made = value
         elif inspect.isfunction(value):

@@ -155,7 +155,7 @@ def _power(field: ComplexArray) -> FloatArray:
 
 def _act(plan: Plan, state: _State, number: int, element: Element, record: Record | None) -> None:
     """Send the rays that stand at a thin element through it."""
-    from fringetrace.optics import Meeting
+    from fringetrace.optics import IncidentRays
 
     batch, optics = state.batch, plan.matter
     assert optics is not None
@@ -164,7 +164,7 @@ def _act(plan: Plan, state: _State, number: int, element: Element, record: Recor
     if len(rows) == 0:
         return
     table = batch.state[rows]
-    meeting = Meeting(
+    meeting = IncidentRays(
         point=table[:, :3], direction=table[:, 3:6], normal=table[:, 6:9], index=state.carried.index[rows],
         field=_field(state.carried, batch, rows), wavelength=optics.wavelength,
     )  # fmt: skip

@@ -75,7 +75,7 @@ class Optics:
         return max([2, *(element.branches for element in self.elements.values())])
 
 
-def materials(scene: Scene) -> tuple[Material, ...]:
+def scene_media(scene: Scene) -> tuple[Material, ...]:
     """The media of a scene by their numbers, first that around it.
 
     Parameters
@@ -127,7 +127,7 @@ def needs(scene: Scene) -> str | None:
     -------
     str or None
     """
-    for medium in materials(scene):
+    for medium in scene_media(scene):
         if medium.dispersive:
             return f"{medium.name} is dispersive"
         if complex(medium.index(1.0)).imag != 0.0:
@@ -173,7 +173,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         if element.polarised and not polarised:
             name = scene.surfaces[number].name
             raise ValueError(f"{name}: expected light with a polarisation, got a scalar beam")
-    known = materials(scene)
+    known = scene_media(scene)
     at = 1.0 if wavelength is None else wavelength
     numbers = {medium: number for number, medium in enumerate(known)}
     sides = [[s.front or scene.around, s.back or scene.around] for s in scene.surfaces]

@@ -12,7 +12,7 @@ from fringetrace.core import ComplexArray, checked_wavelength
 from fringetrace.optics import Dielectric, Metal
 from fringetrace.scene import Surface
 from fringetrace.tracing.fates import Fate
-from fringetrace.tracing.optics_table import materials, needs
+from fringetrace.tracing.optics_table import needs, scene_media
 from fringetrace.tracing.paths import Paths
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
             f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since {why} and "
             f"light is bent, got {wavelength:.6g} m: trace once a wavelength"
         )
-    known = materials(paths.scene)
+    known = scene_media(paths.scene)
     old, new = (np.array([complex(m.index(at)) for m in known]) for at in (paths.wavelength, wavelength))
     phase = 2.0 * math.pi * (new.imag / wavelength - old.imag / paths.wavelength)
     factor = np.exp(-(paths.lengths @ phase)) * _ratio(paths, wavelength)

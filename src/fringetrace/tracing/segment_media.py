@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
 from fringetrace.tracing.fates import Fate
-from fringetrace.tracing.optics_table import constants, materials
+from fringetrace.tracing.optics_table import constants, scene_media
 from fringetrace.tracing.paths import Paths
 
 
@@ -45,14 +45,14 @@ def media(paths: Paths) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.int64]]:
     -------
     through : (m, k - 2) bool
     medium : (m, k - 1) int64
-        Number in `media.materials`.
+        Number in `media.scene_media`.
     """
     assert paths.points is not None
     assert paths.surface is not None
     assert paths.triangle is not None
     assert paths.starts is not None
     scene, (rows, bounces) = paths.scene, paths.surface.shape
-    numbers = {medium: number for number, medium in enumerate(materials(scene))}
+    numbers = {medium: number for number, medium in enumerate(scene_media(scene))}
     beside = np.array(
         [[numbers[s.front or scene.around], numbers[s.back or scene.around]] for s in scene.surfaces]
     )
@@ -99,7 +99,7 @@ def indices(paths: Paths, wavelength: float | None) -> FloatArray:
     (media,) float64
     """
     at = 1.0 if wavelength is None else wavelength
-    return np.array([complex(medium.index(at)).real for medium in materials(paths.scene)])
+    return np.array([complex(medium.index(at)).real for medium in scene_media(paths.scene)])
 
 
 def _last(paths: Paths) -> npt.NDArray[np.int64]:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, unit
-from fringetrace.geometry import Fit, LevelFit, Patches, dot
+from fringetrace.core import Array, ComplexArray, FloatArray, dot, unit
+from fringetrace.geometry import Fit, LevelFit, Patches
 from fringetrace.scene import Surface
-from fringetrace.tracing.optics_table import materials
+from fringetrace.tracing.optics_table import scene_media
 from fringetrace.tracing.paths import Paths
 
 # What tells roundings of float64 has more digits, where the machine has such numbers.
@@ -112,7 +112,7 @@ def indices(paths: Paths) -> FloatArray:
     shape = len(paths), paths.points.shape[1] - 1
     if paths.medium is None:
         return np.ones(shape)
-    known = {m: complex(m.index(paths.wavelength or 1.0)) for m in materials(paths.scene)}
+    known = {m: complex(m.index(paths.wavelength or 1.0)) for m in scene_media(paths.scene)}
     direction = np.asarray(legs(paths)[1], dtype=np.float64)
     medium, normal = np.full(shape, np.nan, dtype=np.complex128), np.zeros((*shape, 3))
     medium[:, 0] = known[paths.scene.around]

@@ -38,7 +38,7 @@ class _Rays:
         return replace(self, origin=origin, length=self.length + path)
 
 
-def trace(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int = 12) -> Paths:
+def trace_float32(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int = 12) -> Paths:
     """Follow rays as `fringetrace.tracing.tracer` does, with all lengths and directions in float32.
 
     Embree's distances as they come, points and optical paths added up in float32, in metres about the

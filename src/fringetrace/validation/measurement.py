@@ -15,7 +15,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, FloatArray, tables
 from fringetrace.field import chosen
 from fringetrace.geometry import Mesh, interpolate_height, write_height_map
-from fringetrace.instruments import Bench, path_slope, records, stepped, tiff
+from fringetrace.instruments import Bench, path_slope, records, step_axis, tiff
 from fringetrace.scene import pixel_centres
 from fringetrace.tracing import Ledger
 
@@ -139,7 +139,7 @@ def _piston(differences: FloatArray, wavelength: float) -> float:
     return middle + float(about[np.abs(about) <= 0.25 * wavelength].mean())
 
 
-def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) -> Measurement:
+def measure_height(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) -> Measurement:
     """Record phase-stepped frames on a bench, find the height, and compare it with the truth.
 
     Parameters
@@ -174,7 +174,7 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
     )
 
 
-def dataset(measurement: Measurement) -> Dataset:
+def measurement_dataset(measurement: Measurement) -> Dataset:
     """Everything, labelled.
 
     Parameters
@@ -204,18 +204,18 @@ def dataset(measurement: Measurement) -> Dataset:
         **{f"power_{name}": value for name, value in vars(m.ledger).items()},
         **{f"version_{name}": version(name) for name in LIBRARIES},
     }
-    return records.dataset(images, m.pitch, stepped(len(m.frames)), **attributes)
+    return records.dataset(images, m.pitch, step_axis(len(m.frames)), **attributes)
 
 
-def write_netcdf(measurement: Measurement, path: Path) -> None:
-    """`dataset` as a NetCDF file.
+def write_measurement(measurement: Measurement, path: Path) -> None:
+    """`measurement_dataset` as a NetCDF file.
 
     Parameters
     ----------
     measurement : Measurement
     path : Path
     """
-    tables.write_netcdf(dataset(measurement), path)
+    tables.write_netcdf(measurement_dataset(measurement), path)
 
 
 def write_camera(measurement: Measurement, folder: Path) -> None:
@@ -259,7 +259,7 @@ def write_pictures(measurement: Measurement, folder: Path) -> None:
     m = measurement
     image = views.interferogram(m.interferogram, m.pitch, wavelength=m.wavelength, title="Interferogram")
     views.save(image, folder / "interferogram.png")
-    left, right = views.pair()
+    left, right = views.side_by_side()
     views.height(m.height, m.pitch, left, title="Height, measured")
     views.residual(m.residual, m.pitch, right, wavelength=m.wavelength, title="Measured − mesh")
     views.save(left, folder / "height.png")

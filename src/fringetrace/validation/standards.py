@@ -252,7 +252,7 @@ def reference(x: FloatArray, tilt: float, arm: float) -> ComplexArray:
     return np.asarray(-0.5j * math.sqrt(math.cos(2.0 * tilt)) * wave)
 
 
-def newton(pixels: int, cells: int) -> Standard:
+def newton_rings(pixels: int, cells: int) -> Standard:
     """Rings of a convex sphere of R = 500 mm against a tilted flat, in a Michelson; see `paraboloid`."""
     radius, width, tilt = 500 * mm, 3 * mm, 0.5e-3
     sample = replace(_ball(radius, 2.0 * width, cells), name="sample")
@@ -283,7 +283,7 @@ def tilt(pixels: int, cells: int) -> Standard:
     return Standard("steep tilt fringes", scene, beam, ccd, truth)
 
 
-def step(pixels: int, cells: int) -> Standard:
+def step_standard(pixels: int, cells: int) -> Standard:
     """A step of 50 nm, 0.3 rad to the columns, in a Michelson."""
     width, edge, rise, turn = 6 * mm, 0.4 * mm, 50 * nm, 0.3
     mesh = shapes.step(4 * width, 4 * width, edge, rise).moved(turn=rotation((0, 0, 1), turn))
@@ -328,7 +328,7 @@ def valley(pixels: int, cells: int) -> Standard:
     return Standard("valley of two mirrors", Scene((Surface(mesh, Mirror()),)), beam, ccd, truth)
 
 
-def corner_cube(pixels: int, cells: int) -> Standard:
+def corner_cube_standard(pixels: int, cells: int) -> Standard:
     """A corner cube of 100 mm that sends a plane wave back onto a CCD tilted by 0.2 mrad."""
     size, side, lean = 100 * mm, 30 * mm, 0.2e-3
     axis = np.ones(3) / math.sqrt(3.0)
@@ -353,9 +353,9 @@ def corner_cube(pixels: int, cells: int) -> Standard:
 STANDARDS: dict[str, Callable[[int, int], Standard]] = {
     "paraboloid": paraboloid,
     "sphere": sphere,
-    "newton": newton,
+    "newton": newton_rings,
     "tilt": tilt,
-    "step": step,
+    "step": step_standard,
     "valley": valley,
-    "corner_cube": corner_cube,
+    "corner_cube": corner_cube_standard,
 }

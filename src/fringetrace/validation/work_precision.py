@@ -59,7 +59,9 @@ class Method:
 
 
 METHODS = (
-    Method("float32, facets", float32_tracer.trace, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)),
+    Method(
+        "float32, facets", float32_tracer.trace_float32, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)
+    ),
     Method("rays, facets", trace, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)),
     Method("rays, form", trace, "rays", True, (64, 128, 256, 400), (24, 48, 96)),
     Method("wavefront, facets", trace, "wavefront", False, (4, 8, 16), (4,)),
@@ -82,7 +84,7 @@ LONG = 0.5
 
 
 @dataclass(frozen=True)
-class Run:
+class StandardRun:
     """One run of a method on a standard.
 
     Attributes
@@ -139,7 +141,9 @@ def irradiance_error(image: FloatArray, truth: FloatArray) -> float:
     return float(np.sqrt(np.mean((image - truth) ** 2)) / truth.mean())
 
 
-def run(standard: Standard, truth: Truth, method: Method, count: int, repeats: int = 1) -> Run:
+def run_standard(
+    standard: Standard, truth: Truth, method: Method, count: int, repeats: int = 1
+) -> StandardRun:
     """Run a method on a standard.
 
     Parameters
@@ -169,7 +173,7 @@ def run(standard: Standard, truth: Truth, method: Method, count: int, repeats: i
     for _ in range(repeats - 1 if seconds < LONG else 0):
         seconds = min(seconds, once()[0])
     bright = irradiance(paths, WAVELENGTH, method.sum)
-    return Run(
+    return StandardRun(
         standard.title, method.name, count**2, standard.triangles, seconds,
         phase_error(field, truth[0]), irradiance_error(bright, truth[1]),
     )  # fmt: skip
@@ -179,7 +183,7 @@ def runs(
     names: Iterable[str] = tuple(STANDARDS),
     quick: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> Iterator[Run]:
+) -> Iterator[StandardRun]:
     """All methods on some standards, with more and more rays.
 
     Facets that only stand for a smooth surface grow with the rays where the wavefront method is to
@@ -204,7 +208,7 @@ def runs(
         For the name of a standard that there is not.
     """
     size = QUICK if quick else FULL
-    chosen = [(name, STANDARDS[name](size.pixels, size.cells)) for name in checked(names)]
+    chosen = [(name, STANDARDS[name](size.pixels, size.cells)) for name in checked_standards(names)]
     plan = [
         (name, standard, method, method.quick if quick else method.full)
         for name, standard in chosen
@@ -222,16 +226,16 @@ def runs(
             if follow:
                 used = STANDARDS[name](size.pixels, count // 2).faceted()
             elif method.name not in begun:  # compiles
-                run(used, truth, method, count)
+                run_standard(used, truth, method, count)
                 begun.add(method.name)
             method.tracer(used.scene, used.lit(1), used.ccd)  # builds what belongs to the scene
-            yield run(used, truth, method, count, size.repeats)
+            yield run_standard(used, truth, method, count, size.repeats)
             done += 1
             if progress is not None:
                 progress(done, total)
 
 
-def checked(names: Iterable[str]) -> tuple[str, ...]:
+def checked_standards(names: Iterable[str]) -> tuple[str, ...]:
     """Names of standards, once they are known to be some.
 
     Parameters
@@ -254,7 +258,7 @@ def checked(names: Iterable[str]) -> tuple[str, ...]:
     return chosen
 
 
-def best(done: Iterable[Run]) -> list[Run]:
+def best(done: Iterable[StandardRun]) -> list[StandardRun]:
     """The most exact run of each method on each standard, in their order.
 
     Parameters
@@ -265,7 +269,7 @@ def best(done: Iterable[Run]) -> list[Run]:
     -------
     list of Run
     """
-    chosen: dict[tuple[str, str], Run] = {}
+    chosen: dict[tuple[str, str], StandardRun] = {}
     for one in done:
         name = one.standard, one.method
         if name not in chosen or one.waves < chosen[name].waves:
@@ -273,7 +277,7 @@ def best(done: Iterable[Run]) -> list[Run]:
     return list(chosen.values())
 
 
-def table(done: Iterable[Run]) -> str:
+def markdown_table(done: Iterable[StandardRun]) -> str:
     """The most exact run of each method on each standard, as a Markdown table.
 
     Parameters
@@ -310,7 +314,7 @@ def machine() -> dict[str, str | int | None]:
     }
 
 
-def write(done: Iterable[Run], folder: Path) -> None:
+def write(done: Iterable[StandardRun], folder: Path) -> None:
     """All runs with machine and versions as `work_precision.json`, and a picture of them.
 
     Parameters
@@ -325,7 +329,7 @@ def write(done: Iterable[Run], folder: Path) -> None:
     views.save(views.comparison(panels(every)), folder / FILES[1])
 
 
-def panels(done: Iterable[Run]) -> dict[str, dict[str, FloatArray]]:
+def panels(done: Iterable[StandardRun]) -> dict[str, dict[str, FloatArray]]:
     """Runs as `views.comparison` draws them.
 
     Parameters

@@ -123,7 +123,7 @@ def test_what_is_no_cubic_tells():
 def fit():
     some = pieces(WHOLE, LEFT)
     _, low, high, coefficients, turns, _, _ = fitted(some)
-    return patch_fit.Fit(some, np.arange(2), coefficients, turns, low, high)
+    return patch_fit.PatchFit(some, np.arange(2), coefficients, turns, low, high)
 
 
 def test_a_fit_knows_its_pieces_on_its_patches():

@@ -177,7 +177,7 @@ def test_without_memory_for_the_centres_of_pixels_the_image_is_the_same(monkeypa
 def test_other_wavelengths_where_the_scene_depends_on_it():
     one = reconstruct(traced(gold=True))
     assert one.wavelength == HENE
-    with pytest.raises(ValueError, match="wavelength: expected 6.328e-07 m, that of the wavefronts"):
+    with pytest.raises(ValueError, match=r"wavelength: expected 6\.328e-07 m, that of the wavefronts"):
         one.irradiance(500 * nm)
 
 

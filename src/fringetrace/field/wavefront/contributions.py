@@ -12,13 +12,42 @@ import numpy.typing as npt
 from fringetrace.core import ComplexArray, FloatArray
 from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront import plane_waves
+from fringetrace.field.wavefront.patches import PatchCells
+from fringetrace.field.wavefront.plane_waves import Region, Wave
+from fringetrace.scene import Beam
 
 if TYPE_CHECKING:
     from fringetrace.field.wavefront.uniform_airy import Folds
-    from fringetrace.field.wavefront.wavefronts import CurvedWave, PlaneWave
 
 # No gradient seen yet: lowest and highest along x, and along y.
 NONE = np.array([np.inf, -np.inf, np.inf, -np.inf])
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneWave:
+    """A plane wave off facets and its region of a beam.
+
+    `path` is a row of the paths that has its key, `odd` whether it has an odd number of half-wave losses.
+    """
+
+    path: int
+    odd: bool
+    beam: Beam
+    wave: Wave
+    region: Region
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedWave:
+    """A curved sheet; `path` and `odd` as those of `PlaneWave`.
+
+    `unit` is the area of the beam that a step of its grid stands for, in pixels.
+    """
+
+    path: int
+    odd: bool
+    unit: float
+    cells: PatchCells
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +107,7 @@ class Contributions:
 
         field, slope = self.points.blank(groups), self.slope
         factor = sign * np.exp(2j * np.pi * (np.fmod(self.base, wavelength) / wavelength))
-        raster_kernels.add(self.rows, self.begin, component, wavelength, group, factor, field)
+        raster_kernels.add_waves(self.rows, self.begin, component, wavelength, group, factor, field)
         if folded and len(slope):
             slope = slope.copy()
         for number, sheet in folded.items():
@@ -86,7 +115,7 @@ class Contributions:
         return field, slope
 
 
-def contributions(
+def find_contributions(
     plane: Sequence[PlaneWave], curved: Sequence[CurvedWave], components: int, points: Samples, slopes: bool
 ) -> Contributions:
     """What waves bring to sample points.
@@ -110,17 +139,26 @@ def contributions(
     slope = np.tile(NONE, (len(points.x) if slopes else 0, 1))
     tables = [np.empty((0, 2 + 2 * components))]
     for one in plane:
-        tables.append(plane_waves.contributions(one.wave, one.region, one.beam, points, slope))
+        tables.append(plane_waves.find_contributions(one.wave, one.region, one.beam, points, slope))
     for sheet in curved:
         cells = sheet.cells
         if cells.folds:
             tables.append(tables[0])
             continue
         tables.append(
-            raster_kernels.contributions(
-                cells.leaves, cells.coefficients, cells.folded, cells.turns, sheet.unit, points.top,
-                points.columns, points.first, points.x, points.y, slope,
-            )  # fmt: skip
+            raster_kernels.leaf_contributions(
+                cells.leaves,
+                cells.coefficients,
+                cells.folded,
+                cells.turns,
+                sheet.unit,
+                points.top,
+                points.columns,
+                points.first,
+                points.x,
+                points.y,
+                slope,
+            )
         )
     begin = np.cumsum([len(table) for table in tables]).astype(np.int64)
     base = np.array([0.0] * len(plane) + [sheet.cells.base for sheet in curved])

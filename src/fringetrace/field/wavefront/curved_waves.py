@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
 from fringetrace.field.wavefront.boundary_search import cut
-from fringetrace.field.wavefront.patch_fit import Fit, fitted, places
+from fringetrace.field.wavefront.patch_fit import PatchFit, fitted, places
 from fringetrace.field.wavefront.patches import (
-    Cells,
+    PatchCells,
     Sheet,
     arrivals,
     branch_turns,
@@ -39,7 +39,7 @@ LOST = 0.1
 STENCIL = 5
 
 
-def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
+def curved(survey: Survey) -> tuple[list[PatchCells], FloatArray]:
     """Sheets that met surfaces with a form, cut along their edges.
 
     Parameters
@@ -71,7 +71,9 @@ def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
         mine = pieces.part(plain & (pieces.wave == n))
         row, column = np.divmod(mine.cell, probe.beam.shape[1])
         turns = branch_turns(grid.turns, areas[n])[row, column]
-        patched = Fit(mine, np.arange(len(row)), coefficients[n][row, column], turns, mine.low, mine.high)
+        patched = PatchFit(
+            mine, np.arange(len(row)), coefficients[n][row, column], turns, mine.low, mine.high
+        )
         found.append(_together([patched, *fit], grid.base, probe.ccd))
         drawn += [_drawn(part, probe) for part in (patched, *fit)]
     return found, np.concatenate(drawn)
@@ -160,9 +162,9 @@ def _plain(
 
 def _fits(
     probe: Probe, names: Array, squares: Squares, pieces: Pieces, bases: list[float], witnesses: Witnesses
-) -> list[list[Fit]]:
+) -> list[list[PatchFit]]:
     """Fits of the cells of pieces, and of their quarters where need be; tables for each sheet."""
-    tables: list[list[Fit]] = [[] for _ in bases]
+    tables: list[list[PatchFit]] = [[] for _ in bases]
     for level in range(QUARTERS + 1):
         bad = np.zeros(len(squares.cell), dtype=np.bool_)
         for n, (fit, off) in enumerate(_fitted(probe, names, pieces, bases)):
@@ -178,7 +180,9 @@ def _fits(
     return tables
 
 
-def _fitted(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> list[tuple[Fit, FloatArray]]:
+def _fitted(
+    probe: Probe, names: Array, pieces: Pieces, bases: list[float]
+) -> list[tuple[PatchFit, FloatArray]]:
     """Fits to rays that start inside the pieces, a table for each sheet, and what rays are off."""
     units, owner = np.unique(np.stack([pieces.wave, pieces.cell]), axis=1, return_inverse=True)
     owner = owner.ravel()
@@ -197,12 +201,14 @@ def _fitted(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> l
             at[mine], low[mine], high[mine], paths.ray[arrived] - mine.start * at.shape[1],
             arrivals(paths, arrived, probe.ccd), amplitude[arrived], base, probe.ccd.shape,
         )  # fmt: skip
-        fit = Fit(pieces.part(part), owner[part] - mine.start, coefficients, turns, low[mine], high[mine])
+        fit = PatchFit(
+            pieces.part(part), owner[part] - mine.start, coefficients, turns, low[mine], high[mine]
+        )
         fits.append((fit.where(good), off[good]))
     return fits
 
 
-def _together(parts: list[Fit], base: float, ccd: CCD) -> Cells:
+def _together(parts: list[PatchFit], base: float, ccd: CCD) -> PatchCells:
     """One sheet's cells and leaves, of several tables of fits."""
     before = np.cumsum([0] + [len(part.coefficients) for part in parts])
     owner = [part.owner + offset for part, offset in zip(parts, before[:-1], strict=True)]
@@ -218,7 +224,7 @@ def _together(parts: list[Fit], base: float, ccd: CCD) -> Cells:
     )
 
 
-def _drawn(fit: Fit, probe: Probe) -> FloatArray:
+def _drawn(fit: PatchFit, probe: Probe) -> FloatArray:
     """Segments (n, 4) in pixels: chords of pieces, and what of the beam's rim they touch."""
     pieces = fit.pieces
     ends, owner = [pieces.chord[pieces.cut]], [fit.owner[pieces.cut]]

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, FloatArray, unit
 from fringetrace.field.wavefront.ray_tubes import along_grid
 from fringetrace.geometry import weld
-from fringetrace.scene import Scene, Surface, parted
+from fringetrace.scene import Scene, Surface, group_facets
 from fringetrace.tracing import Fate, Paths
 
 # Rays go by an edge this many cells to either side of it and within its ends, so far apart along it.
@@ -68,7 +68,9 @@ def creases(scene: Scene) -> Creases:
     Creases
     """
     if "creases" not in scene.derived:
-        found = [_of(surface, part) for surface, part in zip(scene.surfaces, parted(scene), strict=True)]
+        found = [
+            _of(surface, part) for surface, part in zip(scene.surfaces, group_facets(scene), strict=True)
+        ]
         columns = ([getattr(one, field.name) for one in found] for field in fields(Creases))
         scene.derived["creases"] = Creases(*(np.concatenate(column) for column in columns))
     kept: Creases = scene.derived["creases"]
@@ -169,7 +171,7 @@ def _solved(slope: FloatArray, miss: FloatArray) -> FloatArray:
     return np.where((bend > LOST * a * c)[:, None], step, 0.0)
 
 
-def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[tuple[Leg, FloatArray]]:
+def segments_near_edges(paths: Paths, shape: tuple[int, int]) -> Iterator[tuple[Leg, FloatArray]]:
     """Legs of rays from the nodes of a beam's grid, and the edges of meshes that are near them.
 
     Parameters
@@ -203,7 +205,7 @@ def _lines(paths: Paths) -> Iterator[tuple[FloatArray, Array]]:
     assert paths.triangle is not None
     assert paths.points is not None
     assert paths.starts is not None
-    parts = parted(paths.scene)
+    parts = group_facets(paths.scene)
     offset = np.cumsum([0] + [len(part) for part in parts])
     part = np.concatenate(parts)[(paths.triangle + offset[paths.surface]).clip(0)]
     part -= part.min(initial=0)
@@ -264,7 +266,7 @@ def _leg(lines: FloatArray, ray: Array, wide: int, every: Array) -> Leg | None:
     return Leg(corner, stride, number, nodes, start, direction, reach, steps[known])
 
 
-def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, Mask]:
+def places_beside_edges(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, Mask]:
     """Places on a beam's grid from which light comes by the edges of meshes, on either side of them.
 
     Found from the legs of the rays from the nodes: exactly where these are parallel, else to second
@@ -287,7 +289,7 @@ def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray,
         Whether the next one is on the same side of the same edge.
     """
     places, goes_on = [np.empty((0, 2))], [np.empty(0, dtype=np.bool_)]
-    for leg, edges in legs(paths, shape):
+    for leg, edges in segments_near_edges(paths, shape):
         at, on = _along(leg, edges, np.array(shape[::-1]) - 1.0)
         places.append(at)
         goes_on.append(on)
@@ -299,7 +301,7 @@ def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray,
 
 
 def _along(leg: Leg, ends: FloatArray, size: FloatArray) -> tuple[FloatArray, Mask]:
-    """Places on a grid of a size beside edges (n, 2, 3) of meshes that a leg comes by, as `beside`."""
+    """Places on a grid of a size beside edges (n, 2, 3) that a leg comes by, as `places_beside_edges`."""
     at, there, _ = leg.nearest(ends.reshape(-1, 3))
     at, there = at.reshape(-1, 2, 2), there.reshape(-1, 2)
     begin, end = _clipped(at, size)

@@ -123,7 +123,7 @@ def widen_beside(seeds, wavenumber, top, columns, first, x, y, slope):
 
 
 @jit
-def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x, y, latest):
+def branches_beside_folds(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x, y, latest):
     """Two branches at each sample beside a fold, in the dark too: rows; `latest` of each sample."""
     found = np.empty((1024, 18))
     count = 0

@@ -34,7 +34,7 @@ CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class PatchFit:
     """Patches of a sheet and the pieces of cells that they are meant for.
 
     Attributes
@@ -82,11 +82,11 @@ class Fit:
         whole[self.owner[~self.pieces.whole]] = False
         return np.where(whole[:, None], self.low[:, ::-1], -1.0).astype(np.int64)
 
-    def where(self, good: npt.NDArray[np.bool_]) -> Fit:
+    def where(self, good: npt.NDArray[np.bool_]) -> PatchFit:
         """Some of the patches."""
         kept = good[self.owner]
         number = np.cumsum(good) - 1
-        return Fit(
+        return PatchFit(
             self.pieces.part(kept), number[self.owner[kept]], self.coefficients[good], self.turns[good],
             self.low[good], self.high[good],
         )  # fmt: skip

@@ -50,7 +50,7 @@ class Sheet:
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class PatchCells:
     """A sheet's cells as the kernels read them, see `raster_kernels`; for `place` see `leaved`."""
 
     coefficients: FloatArray
@@ -69,7 +69,7 @@ class Cells:
 
     @cached_property
     def crossed(self) -> npt.NDArray[np.bool_]:
-        """Squares (n,) of the beam's grid on which a fold is followed: J changes its sign at their corners."""
+        """Which squares of the beam's grid (n,) a fold crosses: J changes its sign at their corners."""
         corner = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]])
         corners = np.einsum("si,nij,tj->nst", corner, self.coefficients[:, 3], corner)
         signs = (corners.min(axis=(1, 2)) <= 0.0) & (corners.max(axis=(1, 2)) >= 0.0)
@@ -284,8 +284,8 @@ def leaved(
     domain: FloatArray,
     lines: FloatArray,
     ccd: CCD,
-) -> Cells:
-    """Cells and their leaves.
+) -> PatchCells:
+    """PatchCells and their leaves.
 
     Parameters
     ----------
@@ -304,11 +304,11 @@ def leaved(
 
     Returns
     -------
-    Cells
+    PatchCells
     """
     from fringetrace.field.wavefront import raster_kernels
 
-    leaves = raster_kernels.split(np.ascontiguousarray(coefficients[owner]), domain, lines, *ccd.shape)
+    leaves = raster_kernels.split_cells(np.ascontiguousarray(coefficients[owner]), domain, lines, *ccd.shape)
     leaves[:, raster_kernels.CELL] = owner[leaves[:, raster_kernels.CELL].astype(np.int64)]
     folded = np.zeros(len(coefficients), dtype=np.bool_)
     signs = np.zeros((len(coefficients), 2), dtype=np.bool_)
@@ -318,10 +318,10 @@ def leaved(
         ] = True
     folded[leaves[leaves[:, raster_kernels.SIGN] == 0.0, raster_kernels.CELL].astype(np.int64)] = True
     folded |= signs.all(axis=1)
-    return Cells(np.ascontiguousarray(coefficients), leaves, folded, turns, base, place)
+    return PatchCells(np.ascontiguousarray(coefficients), leaves, folded, turns, base, place)
 
 
-def cells(sheet: Sheet, ccd: CCD) -> Cells:
+def cells(sheet: Sheet, ccd: CCD) -> PatchCells:
     """Hermite patches between the nodes of a sheet, and their leaves.
 
     At the rim of the beam's grid a cell reaches on to the rim of the beam, half a cell beyond the rays.
@@ -333,7 +333,7 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
 
     Returns
     -------
-    Cells
+    PatchCells
     """
     coefficients, area = patches(sheet)
     whole = np.isfinite(coefficients).all(axis=(2, 3, 4))

@@ -14,7 +14,7 @@ from fringetrace.field.wavefront.boundary_search import cut
 from fringetrace.field.wavefront.probe import RIM, profile
 from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
-from fringetrace.optics import refracted
+from fringetrace.optics import refract
 from fringetrace.scene import CCD, Beam, Surface
 from fringetrace.tracing import Paths, components, indices, landed
 
@@ -92,7 +92,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     for k, (surface, normal) in enumerate(_met(paths, row)):
         leaving = onward[k] / np.linalg.norm(onward[k])
         turned = direction - 2.0 * (direction @ normal) * normal
-        bent = refracted(direction, normal, index[k], index[k + 1])
+        bent = refract(direction, normal, index[k], index[k + 1])
         if hasattr(surface.interface, "act"):
             bent = leaving
         # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
@@ -133,7 +133,7 @@ def _near(wave: Wave, row: Array, column: Array, ccd: CCD) -> npt.NDArray[np.boo
     return np.asarray(across & (y.max(axis=1) > 0) & (y.min(axis=1) < rows))
 
 
-def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
+def plane_waves_of(survey: Survey) -> Iterator[tuple[Wave, Region]]:
     """Plane waves on a CCD off the facets of a scene, and the regions of the beam they come from.
 
     Parameters
@@ -224,7 +224,7 @@ def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64
     return np.asarray(np.clip(window, 0, limits), dtype=np.int64)
 
 
-def contributions(
+def find_contributions(
     wave: Wave, region: Region, beam: Beam, points: Samples, slope: FloatArray
 ) -> FloatArray:
     """What a plane wave brings to sample points; exact but for rounding.
@@ -236,7 +236,7 @@ def contributions(
     beam : Beam
     points : Samples
     slope : (points, 4) float64, metres a pixel, or (0, 4)
-        Widened, see `raster_kernels.contributions`.
+        Widened, see `raster_kernels.leaf_contributions`.
 
     Returns
     -------
@@ -249,7 +249,7 @@ def contributions(
     if not (window[0] < window[1] and window[2] < window[3]):
         return np.empty((0, 2 + 2 * len(wave.amplitude)))
     back = wave.matrix @ wave.start  # to the corner of the beam's grid
-    found: FloatArray = raster_kernels.contributions_flat(
+    found: FloatArray = raster_kernels.plane_wave_contributions(
         np.linalg.inv(wave.matrix), wave.origin - back, wave.path - wave.gradient @ back,
         wave.gradient, _light(beam, wave, points), region.kind, *region.low, region.begin,
         region.pieces, points.first, points.x, points.y, points.where_x, points.where_y,

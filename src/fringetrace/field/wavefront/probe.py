@@ -21,8 +21,8 @@ FUZZ = 1e-8
 class Probe:
     """A way to ask which sequences of surfaces the light takes from a point of the beam.
 
-    `traced` are the paths whose scene is asked; `parts` are those of `parted`; `keys` the sequences that are
-    looked at, of up to so many `bounces`; light fainter than `faintest` is not followed.
+    `traced` are the paths whose scene is asked; `parts` are those of `group_facets`; `keys` the sequences
+    that are looked at, of up to so many `bounces`; light fainter than `faintest` is not followed.
     """
 
     traced: Paths
@@ -62,9 +62,7 @@ class Probe:
         """
         inside = np.clip(at, RIM, np.array(self.beam.shape[::-1]) - RIM)
         rays = launch_at(self.beam, inside[:, 0], inside[:, 1])
-        paths = retrace(
-            self.traced, rays, record=True, max_bounces=self.bounces, min_amplitude=self.faintest
-        )
+        paths = retrace(self.traced, rays, record=True, max_bounces=self.bounces, min_amplitude=self.faintest)
         rows, _, _ = landed(paths, self.ccd)
         rows = rows[np.isin(paths.key[rows], self.keys)]
         return paths, rows, *self._names(paths, rows)

@@ -70,7 +70,7 @@ def survey(cells, cell, s0, s1, t0, t1):
 
 
 @jit
-def split(cells, domain, lines, rows, columns):
+def split_cells(cells, domain, lines, rows, columns):
     """Leaves of cells, from their domains (s from and to, t from and to) and lines (a, b, c).
 
     Those that no pixel sees are left out.
@@ -173,7 +173,7 @@ def gradient(cells, cell, s, t):
 
 
 @jit
-def contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y, slope):
+def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y, slope):
     """What regular leaves bring to the sample points of a band of pixels that begins at row `top`.
 
     A row for each: the number of the point, the optical path, real and imaginary part of each component
@@ -223,8 +223,8 @@ def contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y,
 
 
 @jit
-def add(rows, begin, component, period, group, factor, field):
-    """Add waves at a wavelength to the fields of their groups; `rows` as `contributions` has them.
+def add_waves(rows, begin, component, period, group, factor, field):
+    """Add waves at a wavelength to the fields of their groups; `rows` as `leaf_contributions` has them.
 
     Those of wave w are rows begin[w] to begin[w + 1]; they are multiplied by factor[w].
     """
@@ -244,17 +244,17 @@ def widen(slope, across, up):
 
 
 @jit
-def contributions_flat(
+def plane_wave_contributions(
     inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, first,
     x, y, where_x, where_y, shape, slope, pixels,
 ):  # fmt: skip
-    """What a plane wave brings to the sample points that its region of the beam reaches, see `contributions`.
+    """What a plane wave brings to the sample points that its region of the beam reaches.
 
     (s, t) = inverse (point - origin); the path at the origin is `path`, its gradient `gradient`.
     `kind` of each cell from (low_s, low_t) on: 0 dark, 1 lit, 2 in pieces, those of the cell from
     begin[cell] on. A piece is s, t from, s, t to, and a, b, c: lit where a s + b t > c. A point belongs
     to the region if (where_x, where_y) does. `pixels` of the band: first and last row, column.
-    `amplitude` is (points or 1, components).
+    `amplitude` is (points or 1, components). Rows are as those of `leaf_contributions`.
     """
     rows, columns = kind.shape
     components = amplitude.shape[1]

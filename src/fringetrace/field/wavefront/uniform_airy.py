@@ -34,13 +34,13 @@ from fringetrace.field.wavefront.fold_branches import (
     TURNS,
     WAY,
     Z,
-    beside,
+    branches_beside_folds,
     resolve,
     seeds,
     taken,
     widen_beside,
 )
-from fringetrace.field.wavefront.patches import Cells
+from fringetrace.field.wavefront.patches import PatchCells
 from fringetrace.field.wavefront.raster_kernels import (
     CELL,
     HIGH,
@@ -68,7 +68,7 @@ from fringetrace.field.wavefront.raster_kernels import (
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """Cells of a sheet, see `Cells`, and the folds on it at a wavelength.
+    """PatchCells of a sheet, see `PatchCells`, and the folds on it at a wavelength.
 
     Attributes
     ----------
@@ -98,12 +98,12 @@ class Folds:
     unit: float
 
 
-def folds(sheet: Cells, period: float, unit: float, component: int = 0) -> Folds:
+def folds(sheet: PatchCells, period: float, unit: float, component: int = 0) -> Folds:
     """Find the folds of a sheet.
 
     Parameters
     ----------
-    sheet : Cells
+    sheet : PatchCells
     period : float, metres
         Wavelength.
     unit : float
@@ -152,18 +152,18 @@ def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
         widen_beside(sheet.seeds, 2.0 * np.pi / sheet.period, *grid[:3], points.x, points.y, slope)
     if len(sheet.seeds):
         wavenumber = 2.0 * np.pi / sheet.period
-        rows = beside(
+        rows = branches_beside_folds(
             sheet.seeds, sheet.coefficients, sheet.index, sheet.lines, sheet.turns, wavenumber, *grid, latest
         )
         resolve(rows, latest)
         near |= touched(latest, points, sheet.leaves)
-    apart = raster_kernels.contributions(sheet.leaves[~near], *cells[:4], *grid, slope)
+    apart = raster_kernels.leaf_contributions(sheet.leaves[~near], *cells[:4], *grid, slope)
     one = np.array([1.0 + 0.0j])
-    raster_kernels.add(
+    raster_kernels.add_waves(
         apart, np.array([0, len(apart)]), 0, sheet.period, np.zeros(1, np.int64), one, field[None]
     )
     if near.any():
-        spread(sheet.leaves[near], *cells, sheet.place, rows, latest, *grid, field, slope)
+        add_folds(sheet.leaves[near], *cells, sheet.place, rows, latest, *grid, field, slope)
     np.add.at(field, rows[:, SAMPLE].astype(np.int64), np.sqrt(sheet.unit) * uniform(rows, sheet.period))
     return np.asarray(field, dtype=np.complex128)
 
@@ -253,11 +253,10 @@ def probe(cells, cell, leaf, sign):
 
 
 @jit
-def spread(
+def add_folds(
     leaves, cells, folded, turns, unit, period, place, rows, latest, top, columns, first, x, y, field, slope
 ):
-    """Add the waves of leaves on and beside folds, but those that `rows` have, see
-    `raster_kernels.contributions`."""
+    """Add the waves of leaves on and beside folds, but those of `rows`; see `leaf_contributions`."""
     for leaf in leaves:
         cell = int(leaf[CELL])
         low, above = max(int(np.floor(leaf[LOW])), top), int(np.floor(leaf[HIGH]))

@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
-from fringetrace.field.wavefront.feature_edges import beside
+from fringetrace.field.wavefront.feature_edges import places_beside_edges
 from fringetrace.field.wavefront.patches import checked
 from fringetrace.field.wavefront.probe import Probe
-from fringetrace.scene import CCD, parted
+from fringetrace.scene import CCD, group_facets
 from fringetrace.tracing import Paths, join, landed
 
 # Rays sent beside edges of meshes, as many times the nodes.
@@ -177,7 +177,7 @@ def survey(paths: Paths) -> Survey:
     nodes = np.stack([column.ravel(), row.ravel()], axis=1).astype(np.float64)
     traced, rows, found, curved = probe.paths(nodes)
     centres = _differing(paths, probe.ccd, traced.ray[rows], traced.key[rows], shape)
-    between, goes_on = beside(traced, shape, MOST * len(nodes))
+    between, goes_on = places_beside_edges(traced, shape, MOST * len(nodes))
     extra = np.concatenate([between, centres])
     goes_on = np.concatenate([goes_on, np.zeros(len(centres), dtype=np.bool_)])
     more, others, its, bent = probe.paths(extra)
@@ -208,7 +208,7 @@ def _probe(paths: Paths) -> Probe:
     rows, _, _ = landed(paths, ccd)
     keys, bounces = np.unique(paths.key[rows]), int(paths.bounces[rows].max(initial=0))
     faintest = 0.5 * float(np.abs(paths.amplitude[rows]).min(initial=1.0))
-    return Probe(paths, beam, ccd, parted(paths.scene), keys, bounces, faintest)
+    return Probe(paths, beam, ccd, group_facets(paths.scene), keys, bounces, faintest)
 
 
 def _differing(paths: Paths, ccd: CCD, node: Array, keys: Names, shape: tuple[int, int]) -> FloatArray:

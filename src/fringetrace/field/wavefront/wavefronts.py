@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,37 +15,21 @@ from fringetrace.field.groups import grouped
 from fringetrace.field.pixel_quadrature import Case, averaged
 from fringetrace.field.sample_points import Edges, Samples, edges
 from fringetrace.field.wavefront import curved_waves, patches, plane_waves
-from fringetrace.field.wavefront.contributions import Contributions, contributions
-from fringetrace.field.wavefront.patches import Cells
-from fringetrace.field.wavefront.plane_waves import Region, Wave
+from fringetrace.field.wavefront.contributions import (
+    Contributions,
+    CurvedWave,
+    PlaneWave,
+    find_contributions,
+)
 from fringetrace.field.wavefront.uniform_airy import Folds, folds
 from fringetrace.field.wavefront.visibility import survey
-from fringetrace.scene import CCD, Beam, Spectrum
+from fringetrace.scene import CCD, Spectrum
 from fringetrace.tracing import Paths, at_wavelength, landed, needs
 
 # Bytes of wavefronts that are kept with the paths, and of what they bring to the centres of the pixels.
 KEPT, CENTRES = 1 << 30, 1 << 28
 
 Groups = npt.NDArray[np.int64]
-
-
-class PlaneWave(NamedTuple):
-    """A plane wave off facets; `path` is a row of the paths with its key, `odd` its number of half-wave losses."""
-
-    path: int
-    odd: bool
-    beam: Beam
-    wave: Wave
-    region: Region
-
-
-class CurvedWave(NamedTuple):
-    """A curved sheet; `unit` is the area of the beam that a step of its grid stands for, in pixels."""
-
-    path: int
-    odd: bool
-    unit: float
-    cells: Cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +127,8 @@ class Wavefronts:
         ValueError
             As in `complex_field`.
         """
-        return self._averaged(self._cases(light, False), groups, half_wave_loss, False)[0]
+        images = self._averaged(self._cases(light, False), groups, half_wave_loss, False)
+        return np.asarray(images[0], dtype=np.complex128)
 
     def irradiance(self, light: float | Spectrum, half_wave_loss: bool = True) -> FloatArray:
         """Mean of |E|^2 over each pixel.
@@ -180,15 +165,20 @@ class Wavefronts:
         -------
         (components, rows, columns) complex128
         """
-        return self._averaged(self._cases(wavelength, True), None, True, True, rows, more)[:, 0]
+        images = self._averaged(self._cases(wavelength, True), None, True, True, rows, more)
+        return np.asarray(images[:, 0], dtype=np.complex128)
 
     def _cases(self, light: float | Spectrum, apart: bool) -> list[Case]:
         """Wavelengths and components to be evaluated; `apart`: an image for each component."""
-        shares = [(light, 1.0)]
         if isinstance(light, Spectrum):
             shares = list(zip(light.wavelengths.tolist(), light.weights.tolist(), strict=True))
-        every = range(self.components)
-        cases = [Case(checked_wavelength(w), k, share, k if apart else 0) for w, share in shares for k in every]
+        else:
+            shares = [(light, 1.0)]
+        cases = [
+            Case(checked_wavelength(wavelength), k, share, k if apart else 0)
+            for wavelength, share in shares
+            for k in range(self.components)
+        ]
         for case in cases:
             if self.wavelength not in (None, case.wavelength):
                 raise ValueError(
@@ -212,12 +202,14 @@ class Evaluation:
     """The fields of groups of waves at sample points, as `averaged` asks for them."""
 
     def __init__(self, wavefronts: Wavefronts, groups: Groups, half_wave_loss: bool) -> None:
-        waves = [*wavefronts.plane, *wavefronts.curved]
+        waves: list[PlaneWave | CurvedWave] = [*wavefronts.plane, *wavefronts.curved]
         self.wavefronts = wavefronts
         self.groups = int(groups.max(initial=0)) + 1
         self.group = np.array([groups[wave.path] for wave in waves], dtype=np.int64)
         self.sign = np.array([-1.0 if wave.odd and not half_wave_loss else 1.0 for wave in waves])
-        self.folding = {n: one for n, one in enumerate(waves) if isinstance(one, CurvedWave) and one.cells.folds}
+        self.folding = {
+            n: one for n, one in enumerate(waves) if isinstance(one, CurvedWave) and one.cells.folds
+        }
         self.folds: dict[tuple[float, int], dict[int, Folds]] = {}
 
     def prepare(self, case: Case) -> None:
@@ -231,9 +223,9 @@ class Evaluation:
         one, kept = self.wavefronts, self.wavefronts.derived
         key = points.top, len(points.x)
         if not slopes:
-            return contributions(one.plane, one.curved, one.components, points, slopes)
+            return find_contributions(one.plane, one.curved, one.components, points, slopes)
         if key not in kept:
-            found = contributions(one.plane, one.curved, one.components, points, slopes)
+            found = find_contributions(one.plane, one.curved, one.components, points, slopes)
             if sum(each.nbytes for each in kept.values()) + found.nbytes > CENTRES:
                 return found
             kept[key] = found
@@ -293,12 +285,11 @@ def _kept(paths: Paths, wavelength: float | None) -> Wavefronts:
 def _together(parts: Sequence[Wavefronts]) -> Wavefronts:
     """Waves of several beams."""
     before = np.cumsum([0] + [part.paths for part in parts]).tolist()
-    plane = [w._replace(path=w.path + n) for n, part in zip(before, parts, strict=False) for w in part.plane]
-    curved = [w._replace(path=w.path + n) for n, part in zip(before, parts, strict=False) for w in part.curved]
+    numbered = list(zip(before, parts, strict=False))
+    plane = [replace(wave, path=wave.path + n) for n, part in numbered for wave in part.plane]
+    curved = [replace(wave, path=wave.path + n) for n, part in numbered for wave in part.curved]
     segments = np.concatenate([part.segments for part in parts])
-    return replace(
-        parts[0], plane=tuple(plane), curved=tuple(curved), segments=segments, paths=before[-1]
-    )
+    return replace(parts[0], plane=tuple(plane), curved=tuple(curved), segments=segments, paths=before[-1])
 
 
 def _reconstructed(paths: Paths) -> Wavefronts:
@@ -320,7 +311,9 @@ def _reconstructed(paths: Paths) -> Wavefronts:
     seen = survey(paths)
     odd = seen.paths.reflections[seen.first] % 2 == 1
     about = {name: (path(key), bool(o)) for name, key, o in zip(seen.names, seen.keys, odd, strict=True)}
-    plane = [PlaneWave(*about[wave.name], beam, wave, region) for wave, region in plane_waves.waves(seen)]
+    plane = [
+        PlaneWave(*about[wave.name], beam, wave, region) for wave, region in plane_waves.plane_waves_of(seen)
+    ]
     cells, rim = curved_waves.curved(seen)
     named = seen.names[seen.curved]
     sheets = [CurvedWave(*about[name], unit, one) for name, one in zip(named, cells, strict=True)]

@@ -19,12 +19,12 @@ def _pairs(c: Coefficients) -> list[tuple[float, float]]:
     return list(zip(c[0::2], c[1::2], strict=True))
 
 
-def constant(w: FloatArray, c: Coefficients) -> FloatArray:
+def _constant(w: FloatArray, c: Coefficients) -> FloatArray:
     """c0."""
     return np.full_like(w, c[0])
 
 
-def sellmeier(w: FloatArray, c: Coefficients) -> FloatArray:
+def _sellmeier(w: FloatArray, c: Coefficients) -> FloatArray:
     """n^2 = 1 + c0 + sum of ci w^2 / (w^2 - cj^2): resonances by their wavelengths (formula 1)."""
     return np.sqrt(1.0 + c[0] + sum(b * w**2 / (w**2 - r**2) for b, r in _pairs(c[1:])))
 
@@ -49,7 +49,7 @@ def mixed(w: FloatArray, c: Coefficients) -> FloatArray:
     return np.sqrt(square + sum(b * w**p for b, p in _pairs(c[1 + poles :])))
 
 
-def cauchy(w: FloatArray, c: Coefficients) -> FloatArray:
+def _cauchy(w: FloatArray, c: Coefficients) -> FloatArray:
     """Cauchy's n = c0 + sum of ci w^cj (formula 5)."""
     return np.asarray(c[0] + sum(b * w**p for b, p in _pairs(c[1:])), dtype=np.float64)
 
@@ -84,12 +84,12 @@ def exponential(w: FloatArray, c: Coefficients) -> FloatArray:
 
 # By name: the function, and the numbers of coefficients that it takes.
 FORMS: dict[str, tuple[Callable[[FloatArray, Coefficients], FloatArray], range]] = {
-    "constant": (constant, range(1, 2)),
-    "formula 1": (sellmeier, range(1, 18, 2)),
+    "constant": (_constant, range(1, 2)),
+    "formula 1": (_sellmeier, range(1, 18, 2)),
     "formula 2": (sellmeier2, range(1, 18, 2)),
     "formula 3": (polynomial, range(1, 18, 2)),
     "formula 4": (mixed, range(1, 18, 2)),
-    "formula 5": (cauchy, range(1, 18, 2)),
+    "formula 5": (_cauchy, range(1, 18, 2)),
     "formula 6": (gas, range(1, 18, 2)),
     "formula 7": (herzberger, range(3, 7)),
     "formula 8": (retro, range(4, 5)),
@@ -99,7 +99,7 @@ FORMS: dict[str, tuple[Callable[[FloatArray, Coefficients], FloatArray], range]]
 
 
 @dataclass(frozen=True)
-class Formula:
+class IndexFormula:
     """A curve by one of `FORMS`; numbers 1 to 9 are those of refractiveindex.info.
 
     Parameters
@@ -138,7 +138,7 @@ class Formula:
 
 
 @dataclass(frozen=True)
-class Table:
+class IndexTable:
     """A curve through points, straight from each to the next.
 
     Parameters
@@ -181,7 +181,7 @@ class Table:
         return np.asarray(np.interp(wavelength, self.wavelength, self.value), dtype=np.float64)
 
 
-Curve = Formula | Table
+Curve = IndexFormula | IndexTable
 
 
 def checked_range(limits: tuple[float, float] | None, what: str) -> None:

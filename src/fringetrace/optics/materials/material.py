@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import ComplexArray, nm, um
-from fringetrace.optics.materials.dispersion import Curve, Formula, Table
+from fringetrace.optics.materials.dispersion import Curve, IndexFormula, IndexTable
 
 # Wavelengths in metres are rounded: the ends of a range belong to it.
 SLACK = 1e-12
@@ -56,7 +56,7 @@ class Material:
     def dispersive(self) -> bool:
         """Whether the index may change with the wavelength."""
         return any(
-            not (isinstance(curve, Formula) and curve.form == "constant")
+            not (isinstance(curve, IndexFormula) and curve.form == "constant")
             for curve in (self.n, self.kappa)
             if curve is not None
         )
@@ -138,9 +138,9 @@ def constant(n: complex, name: str = "") -> Material:
     value = complex(n)
     if not (np.isfinite(value) and value.real >= 0.0 and value.imag >= 0.0 and value != 0.0):
         raise ValueError(f"constant index {name}: expected n + i kappa with n, kappa >= 0, got {n!r}")
-    kappa = Formula("constant", (value.imag,)) if value.imag > 0.0 else None
+    kappa = IndexFormula("constant", (value.imag,)) if value.imag > 0.0 else None
     text = f"n={value.real:.6g}" + (f"+{value.imag:.6g}i" if kappa else "")
-    return Material(name or text, Formula("constant", (value.real,)), kappa)
+    return Material(name or text, IndexFormula("constant", (value.real,)), kappa)
 
 
 def cauchy(
@@ -168,7 +168,7 @@ def cauchy(
     """
     powers = [(term * um ** -(2 * k + 2), -(2.0 * k + 2.0)) for k, term in enumerate(terms)]
     coefficients = (float(a), *(float(number) for pair in powers for number in pair))
-    return Material(name, Formula("formula 5", coefficients, _in_um(range)), source=source)
+    return Material(name, IndexFormula("formula 5", coefficients, _in_um(range)), source=source)
 
 
 def sellmeier(
@@ -214,7 +214,7 @@ def sellmeier(
         )
     form, scale = ("formula 1", um) if squares is None else ("formula 2", um**2)
     pairs = [float(number) for b, c in zip(strengths, given[0], strict=True) for number in (b, c / scale)]
-    return Material(name, Formula(form, (float(offset), *pairs), _in_um(range)), source=source)
+    return Material(name, IndexFormula(form, (float(offset), *pairs), _in_um(range)), source=source)
 
 
 def tabulated(
@@ -249,8 +249,8 @@ def tabulated(
         return tuple(np.asarray(values, dtype=np.float64).tolist())
 
     w = numbers(np.asarray(wavelength, dtype=np.float64) / um)
-    absorption = None if kappa is None else Table(w, numbers(kappa))
-    return Material(name, Table(w, numbers(n)), absorption, source)
+    absorption = None if kappa is None else IndexTable(w, numbers(kappa))
+    return Material(name, IndexTable(w, numbers(n)), absorption, source)
 
 
 def absorbing(material: Material, strength: float, length: float) -> Material:
@@ -266,5 +266,5 @@ def absorbing(material: Material, strength: float, length: float) -> Material:
     -------
     Material
     """
-    kappa = Formula("exponential", (float(strength), length / um), material.n.range)
+    kappa = IndexFormula("exponential", (float(strength), length / um), material.n.range)
     return Material(material.name, material.n, kappa, material.source)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray
-from fringetrace.geometry import Fit, LevelFit, Meeting, dot
+from fringetrace.core import Array, FloatArray, dot
+from fringetrace.geometry import Fit, LevelFit, Meeting
 from fringetrace.scene import Scene
 from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.intersect.bodies import Body

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fringetrace.core import nm
-from fringetrace.views.plots.spectra import blank, edges, label, short, spectra, styles
+from fringetrace.views.plots.spectra import axis_label, cell_edges, new_axes, short, spectra, styles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -93,12 +93,12 @@ def brdf(
     """
     at, named = _at(table, wavelength)
     flat = _only(at, ("theta_i", "theta_o"))
-    up, right = (np.rad2deg(edges(flat[name], flat.sizes[name], str(name))) for name in flat.dims)
-    ax = blank(5.6, 4.4) if ax is None else ax
+    up, right = (np.rad2deg(cell_edges(flat[name], flat.sizes[name], str(name))) for name in flat.dims)
+    ax = new_axes(5.6, 4.4) if ax is None else ax
     drawn = ax.pcolormesh(right, up, np.asarray(flat), vmin=0.0, cmap="viridis")
     ax.set(xlabel=r"$\theta_o$ (to the eye) / °", ylabel=r"$\theta_i$ (to the light) / °", aspect="equal")
     ax.set_title(", ".join(filter(None, (title, named))))
-    _bar(ax, drawn, label(table))
+    _bar(ax, drawn, axis_label(table))
     return ax
 
 
@@ -128,7 +128,7 @@ def polar(
     """
     whole = table.sizes.get("phi_o", 1) > 1
     if ax is None:
-        ax = blank(5.6, 4.6, "polar") if whole else _half()
+        ax = new_axes(5.6, 4.6, "polar") if whole else _half()
     if ax.name != "polar":
         raise ValueError(f"axes: expected polar ones, as of subplots with projection='polar', got {ax.name}")
     at, named = _at(table, wavelength)
@@ -161,19 +161,23 @@ def _lobes(table: DataArray, ax: Any) -> None:
     at = np.arange(-90, 91, 30)
     ax.set_xticks(np.radians(at), labels=[f"{angle}°".replace("-", "−") for angle in at])
     ax.legend(
-        title=f"{label(table)}, light from", loc="upper center", bbox_to_anchor=(0.5, 0.2), ncols=4,
+        title=f"{axis_label(table)}, light from", loc="upper center", bbox_to_anchor=(0.5, 0.2), ncols=4,
         fontsize="small", frameon=False,
     )  # fmt: skip
 
 
 def _hemisphere(table: DataArray, ax: Any) -> None:
     flat = _only(table, ("theta_o", "phi_o"))
-    outwards = edges(flat["theta_o"], flat.sizes["theta_o"], "theta_o")
+    outwards = cell_edges(flat["theta_o"], flat.sizes["theta_o"], "theta_o")
     if float(flat["theta_o"][0]) < 0.0:
         raise ValueError("theta_o: expected angles from 0 up beside several phi_o, got negative ones")
     rings = np.rad2deg(np.clip(outwards, 0.0, 0.5 * np.pi))
     drawn = ax.pcolormesh(
-        edges(flat["phi_o"], flat.sizes["phi_o"], "phi_o"), rings, np.asarray(flat), vmin=0.0, cmap="viridis"
+        cell_edges(flat["phi_o"], flat.sizes["phi_o"], "phi_o"),
+        rings,
+        np.asarray(flat),
+        vmin=0.0,
+        cmap="viridis",
     )
     ax.grid(alpha=0.3)
     ax.set_ylim(0.0, 90.0)
@@ -184,7 +188,7 @@ def _hemisphere(table: DataArray, ax: Any) -> None:
         turn, np.rad2deg(abs(start[0])), "o", color="white", markeredgecolor="black", label="light from here"
     )
     ax.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.12), fontsize="small", frameon=False)
-    _bar(ax, drawn, label(table), 0.14)
+    _bar(ax, drawn, axis_label(table), 0.14)
 
 
 def spectrogram(
@@ -211,12 +215,12 @@ def spectrogram(
         If another axis has several values.
     """
     flat = _only(table, ("theta_o", "wavelength"))
-    ax = blank() if ax is None else ax
+    ax = new_axes() if ax is None else ax
     drawn = _spectrogram(flat, ax, _top(flat) if top is None else top)
     ax.set(xlabel="wavelength / nm", ylabel="observed at / °")
     if title:
         ax.set_title(title)
-    _bar(ax, drawn, label(table))
+    _bar(ax, drawn, axis_label(table))
     return ax
 
 
@@ -263,7 +267,7 @@ def overview(table: DataArray, columns: int = 4) -> Figure:
         ax.set_title(title, fontsize="small")
     figure.supxlabel("wavelength / nm")
     figure.supylabel("observed at / °")
-    figure.colorbar(drawn, ax=panels, label=label(table))
+    figure.colorbar(drawn, ax=panels, label=axis_label(table))
     return figure
 
 

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fringetrace.core import FloatArray, nm
 from fringetrace.scattering import colour as spectra
-from fringetrace.views.plots.spectra import STYLES, blank, edges, lay_over, rainbow
+from fringetrace.views.plots.spectra import STYLES, cell_edges, lay_over, new_axes, rainbow
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -56,7 +56,7 @@ def swatches(
     colours = _colours(xyz, 2, gamut)
     if len(labels) != len(colours):
         raise ValueError(f"labels: expected {len(colours)}, one a colour, got {len(labels)}")
-    ax = blank(max(2.0, 1.1 * len(colours)), 1.6) if ax is None else ax
+    ax = new_axes(max(2.0, 1.1 * len(colours)), 1.6) if ax is None else ax
     ax.imshow(colours[None], extent=(0.0, len(colours), 0.0, 1.0), interpolation="nearest")
     ax.set_xticks(np.arange(len(colours)) + 0.5, list(labels))
     ax.set_yticks([])
@@ -89,8 +89,8 @@ def strip(
         If shapes do not agree.
     """
     colours = _colours(xyz, 2, gamut)
-    sides = edges(places, len(colours), "places")
-    ax = blank(7.0, 1.3) if ax is None else ax
+    sides = cell_edges(places, len(colours), "places")
+    ax = new_axes(7.0, 1.3) if ax is None else ax
     ax.pcolormesh(sides, [0.0, 1.0], colours[None])
     ax.set(xlabel=label, yticks=[])
     return ax
@@ -125,18 +125,18 @@ def angles(
         If shapes do not agree.
     """
     colours = _colours(xyz, 3, gamut)
-    up = np.degrees(edges(theta_i, colours.shape[0], "theta_i"))
-    right = np.degrees(edges(theta_o, colours.shape[1], "theta_o"))
-    ax = blank(5.0, 4.4) if ax is None else ax
+    up = np.degrees(cell_edges(theta_i, colours.shape[0], "theta_i"))
+    right = np.degrees(cell_edges(theta_o, colours.shape[1], "theta_o"))
+    ax = new_axes(5.0, 4.4) if ax is None else ax
     ax.pcolormesh(right, up, colours)
     ax.set(xlabel=r"$\theta_o$ (to the eye) / °", ylabel=r"$\theta_i$ (to the light) / °", aspect="equal")
     return ax
 
 
-def sphere(
+def draw_sphere(
     xyz: npt.ArrayLike, ax: Axes | None = None, *, title: str | None = None, gamut: str = "clip"
 ) -> Axes:
-    """A picture of a sphere, as of `bsdf.sphere` or `mirrored`, on dark grey.
+    """A picture of a sphere, as of `bsdf_tables.shaded_sphere` or `mirrored`, on dark grey.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def sphere(
     values = np.asarray(xyz, dtype=np.float64)
     colours = _colours(np.nan_to_num(values), 3, gamut)
     colours[np.isnan(values).any(axis=-1)] = BEHIND
-    ax = blank(3.4, 3.6) if ax is None else ax
+    ax = new_axes(3.4, 3.6) if ax is None else ax
     ax.imshow(colours, origin="lower", interpolation="nearest")
     ax.set_axis_off()
     if title:
@@ -186,7 +186,7 @@ def mirrored(xyz: npt.ArrayLike, theta: npt.ArrayLike, pixels: int = 256) -> Flo
     return np.where(radius[..., None] < 1.0, picture, np.nan)
 
 
-def spectrum(
+def coloured_spectra(
     reflectance: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
     ax: Axes | None = None,
@@ -220,7 +220,7 @@ def spectrum(
             f"spectra: expected as many values as the {at.size} wavelengths and as many labels as spectra, "
             f"got shape {values.shape} and {len(labels)} labels"
         )
-    ax = blank(7.0, 4.0) if ax is None else ax
+    ax = new_axes(7.0, 4.0) if ax is None else ax
     for row, curve in enumerate(values):
         colour = STYLES[(row + 3) % len(STYLES)][0]
         ax.plot(at / nm, curve, color=colour, label=labels[row] if labels else None)

@@ -8,37 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fringetrace.core import Array, FloatArray, checked_wavelength, unit_of, whole
-from fringetrace.views.plots.brdf import brdf, mirror_spectra, overview, polar, spectrogram
-from fringetrace.views.plots.spectra import comparison, spectra, work_precision
-from fringetrace.views.scene3d.describe import itinerary
-from fringetrace.views.scene3d.subprocess import opengl
-from fringetrace.views.scene3d.viewer import export, page, picture, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
     from matplotlib.figure import Figure
-
-__all__ = [
-    "brdf",
-    "comparison",
-    "export",
-    "height",
-    "interferogram",
-    "itinerary",
-    "mirror_spectra",
-    "opengl",
-    "overview",
-    "page",
-    "phase",
-    "picture",
-    "polar",
-    "residual",
-    "save",
-    "show",
-    "spectra",
-    "spectrogram",
-    "work_precision",
-]
 
 NO_LIGHT = "#D0D0D0"
 
@@ -56,7 +29,7 @@ def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
     return axes
 
 
-def pair() -> tuple[Axes, Axes]:
+def side_by_side() -> tuple[Axes, Axes]:
     """Two axes side by side in a figure of their own, with room for a colour bar beside each.
 
     Returns

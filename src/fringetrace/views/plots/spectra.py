@@ -35,7 +35,7 @@ Curves = Mapping[str, FloatArray]
 Panels = Mapping[str, Curves]
 
 
-def blank(width: float = 7.0, height: float = 4.0, projection: str | None = None) -> Axes:
+def new_axes(width: float = 7.0, height: float = 4.0, projection: str | None = None) -> Axes:
     """Axes in a figure of their own.
 
     Parameters
@@ -75,7 +75,7 @@ def short(name: str, value: Any) -> str:
     return f"{name} {number / nm:g} nm" if 0.0 < number < 1e-3 else f"{name} {number:g}"
 
 
-def label(table: DataArray) -> str:
+def axis_label(table: DataArray) -> str:
     """Name and unit of a table's values, for an axis or a colour bar.
 
     Parameters
@@ -117,7 +117,7 @@ def styles(count: int, what: str) -> list[tuple[str, str, str]]:
     return [STYLES[which] for which in STRONG[:count]]
 
 
-def edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
+def cell_edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
     """Sides of cells: halfway between neighbouring places, and as far beyond the last.
 
     Parameters
@@ -213,7 +213,7 @@ def spectra(
     flat = table.transpose(*others, "wavelength")
     varied = [name for name in others if table.sizes[name] > 1]
     rows = np.asarray(flat).reshape(-1, table.sizes["wavelength"])
-    ax = blank() if ax is None else ax
+    ax = new_axes() if ax is None else ax
     at, alone = np.asarray(table["wavelength"]) / nm, None if measured is None else "model"
     places = np.ndindex(*(table.sizes[name] for name in others))
     for values, place, (colour, _, line) in zip(rows, places, styles(len(rows), "spectra"), strict=True):
@@ -223,7 +223,7 @@ def spectra(
     if measured is not None:
         lambertian = table.attrs.get("units") in PER_STERADIAN
         lay_over(ax, measured, *((1.0 / np.pi, " / π") if lambertian else ()))
-    ax.set(xlabel="wavelength / nm", ylabel=label(table), xlim=(at.min(), at.max()))
+    ax.set(xlabel="wavelength / nm", ylabel=axis_label(table), xlim=(at.min(), at.max()))
     if title:
         ax.set_title(title)
     ax.autoscale(axis="y")  # again, for axes that share their scale
@@ -271,7 +271,7 @@ def work_precision(
         raise ValueError("work_precision: expected at least one curve, got none")
     if against not in ("seconds", "rays"):
         raise ValueError(f"against: expected seconds or rays, got {against!r}")
-    ax = blank() if ax is None else ax
+    ax = new_axes() if ax is None else ax
     names = list(order or curves)
     for name, (rays, seconds, error) in curves.items():
         colour, mark, line = STYLES[names.index(name) % len(STYLES)]

@@ -17,7 +17,7 @@ ENDS = {
 NOTHING = 1e-12
 
 
-def itinerary(paths: Paths, row: int, wavelength: float | None = None) -> str:
+def describe_path(paths: Paths, row: int, wavelength: float | None = None) -> str:
     """One path in words: places, surfaces met, lengths, phase and power.
 
     Parameters
@@ -42,10 +42,10 @@ def itinerary(paths: Paths, row: int, wavelength: float | None = None) -> str:
     """
     if not -len(paths) <= row < len(paths):
         raise IndexError(f"itinerary row: expected one of {len(paths)} paths, got {row}")
-    return told(strands(paths.where(np.array([row])), wavelength, every=True), 0)
+    return describe_polyline(strands(paths.where(np.array([row])), wavelength, every=True), 0)
 
 
-def told(shown: Strands, number: int, wavelength: int | None = None, step: float = 0.0) -> str:
+def describe_polyline(shown: Strands, number: int, wavelength: int | None = None, step: float = 0.0) -> str:
     """One of the strands in words.
 
     Parameters

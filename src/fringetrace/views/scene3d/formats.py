@@ -25,7 +25,7 @@ THIN, SIDES = 1e-3, 6
 UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
-def export(view: View, path: str | os.PathLike[str]) -> None:
+def write_view(view: View, path: str | os.PathLike[str]) -> None:
     """Write a view's surfaces and rays; the file is there in full or not at all. Lengths in metres.
 
     Parameters

@@ -114,7 +114,7 @@ class Stage:
         return [*solids, *((panel.name, panel.corners) for panel in self.panels)]
 
 
-def extent(scene: Scene) -> float:
+def scene_size(scene: Scene) -> float:
     """Largest side of the box around the surfaces of a scene.
 
     Parameters
@@ -129,7 +129,7 @@ def extent(scene: Scene) -> float:
     return float(np.ptp(bounds.reshape(-1, 3), axis=0).max())
 
 
-def staged(
+def lay_out(
     scene: Scene,
     parts: Sequence[Paths] = (),
     shown: Strands | None = None,
@@ -163,7 +163,7 @@ def staged(
     ValueError
         For an unknown surface or way of colouring, an image without a CCD.
     """
-    size = extent(scene)
+    size = scene_size(scene)
     solids, legend = _solids(scene, surfaces, relief)
     panels, arrows = _ends(parts, shown, size, image)
     corners = np.concatenate([solid.vertices for solid in solids] + [panel.corners for panel in panels])
@@ -331,7 +331,7 @@ def _overlap(box: FloatArray, taken: Sequence[FloatArray]) -> float:
     return float(np.prod(np.maximum(sides, 0.0), axis=1).sum())
 
 
-def exploded(shown: Strands, shift: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+def explode(shown: Strands, shift: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     """Ends of legs, each moved the farther the more surfaces light has met.
 
     Parameters

@@ -72,7 +72,7 @@ class Scale:
         return np.round(np.stack(columns, axis=1)).astype(np.uint8)
 
 
-def checked(way: str, strands: Strands | None) -> str:
+def checked_colouring(way: str, strands: Strands | None) -> str:
     """The way of colouring itself, once it is known to be one, and possible.
 
     Parameters

@@ -102,7 +102,7 @@ def written(view: Callable[[], View], path: str | os.PathLike[str], size: tuple[
         os.replace(part, target)
 
 
-def opened(view: View, size: tuple[int, int]) -> None:
+def open_window(view: View, size: tuple[int, int]) -> None:
     """A window with a view; comes back once it is closed.
 
     Parameters

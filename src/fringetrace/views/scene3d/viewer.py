@@ -15,10 +15,10 @@ from fringetrace.instruments import Bench, Mark
 from fringetrace.scene import Scene
 from fringetrace.tracing import Paths
 from fringetrace.views.scene3d import formats, html
-from fringetrace.views.scene3d.layout import apart, extent, staged
-from fringetrace.views.scene3d.palette import checked
+from fringetrace.views.scene3d.layout import apart, lay_out, scene_size
+from fringetrace.views.scene3d.palette import checked_colouring
 from fringetrace.views.scene3d.polylines import Strands, strands
-from fringetrace.views.scene3d.subprocess import opened, written
+from fringetrace.views.scene3d.subprocess import open_window, written
 from fringetrace.views.scene3d.vtk import View
 
 Several = Paths | Sequence[Paths] | None
@@ -31,7 +31,7 @@ ONWARD = 0.3
 
 
 class Looks(TypedDict, total=False):
-    """How a scene is drawn; see `view`."""
+    """How a scene is drawn; see `scene_view`."""
 
     colour: str
     wavelength: float | None
@@ -65,7 +65,7 @@ def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
     return rows, columns
 
 
-def view(
+def scene_view(
     scene: Scene | Bench,
     paths: Several = None,
     *,
@@ -132,7 +132,7 @@ def view(
     ValueError
         If the paths have no recorded points, a name or a way of colouring is unknown, the image does not fit.
     """
-    checked(colour, None)
+    checked_colouring(colour, None)
     if isinstance(scene, Bench):
         paths = scene.sampled(few(scene.beam.shape), wavelength) if paths is None else paths
         reference = (scene.mark or Mark(scene.reference)) if reference is None else reference
@@ -145,10 +145,10 @@ def view(
         mark = Mark(scene.index(reference)) if isinstance(reference, str) else reference
         shown = strands(
             parts, wavelength, most=most, every=colour == "fate" if every is None else every, reference=mark,
-            sweep=sweep, onward=ONWARD * extent(scene),
+            sweep=sweep, onward=ONWARD * scene_size(scene),
         )  # fmt: skip
-        checked(colour, shown)
-    stage = staged(scene, parts, shown, image=image, surfaces=surfaces, relief=relief)
+        checked_colouring(colour, shown)
+    stage = lay_out(scene, parts, shown, image=image, surfaces=surfaces, relief=relief)
     plane = None if clip is None else tuple(np.asarray(part, dtype=np.float64) for part in clip)
     return View(stage, shown, colour, step, None, upto, _shift(explode, shown), tubes, plane)  # type: ignore[arg-type]
 
@@ -174,21 +174,21 @@ def picture(
     Parameters
     ----------
     scene : Scene or Bench
-    paths : as in `view`; or callable
+    paths : as in `scene_view`; or callable
         A function that gives them is called while VTK is loaded.
     path : path
     size : (width, height), pixels
     **looks
-        Colours and the like, see `view`.
+        Colours and the like, see `scene_view`.
 
     Raises
     ------
     RuntimeError
         If there are no OpenGL libraries (says which packages to install), or VTK fails.
     ValueError
-        As `view`.
+        As `scene_view`.
     """
-    written(lambda: view(scene, paths() if callable(paths) else paths, **looks), path, size)
+    written(lambda: scene_view(scene, paths() if callable(paths) else paths, **looks), path, size)
 
 
 def show(
@@ -203,19 +203,19 @@ def show(
     Parameters
     ----------
     scene : Scene or Bench
-    paths : as in `view`
+    paths : as in `scene_view`
     size : (width, height), pixels
     **looks
-        Colours and the like, see `view`.
+        Colours and the like, see `scene_view`.
 
     Raises
     ------
     RuntimeError
         As `picture`; if there is no display.
     ValueError
-        As `view`.
+        As `scene_view`.
     """
-    opened(_interactive(scene, paths, looks), size)
+    open_window(_interactive(scene, paths, looks), size)
 
 
 def page(
@@ -231,20 +231,20 @@ def page(
     Parameters
     ----------
     scene : Scene or Bench
-    paths : as in `view`
+    paths : as in `scene_view`
     path : path
     title : str
     **looks
-        What it begins with, see `view`; clipping and tubes are for pictures and windows.
+        What it begins with, see `scene_view`; clipping and tubes are for pictures and windows.
 
     Raises
     ------
     ImportError
         If plotly is missing; says what to install.
     ValueError
-        As `view`.
+        As `scene_view`.
     """
-    html.page(_interactive(scene, paths, looks), path, title)
+    html.write_page(_interactive(scene, paths, looks), path, title)
 
 
 def export(
@@ -255,23 +255,23 @@ def export(
     Parameters
     ----------
     scene : Scene or Bench
-    paths : as in `view`
+    paths : as in `scene_view`
     path : path
-        Its suffix says the kind, see `exports.export`.
+        Its suffix says the kind, see `exports.write_view`.
     **looks
-        Colours and the like, see `view`.
+        Colours and the like, see `scene_view`.
 
     Raises
     ------
     ValueError
-        As `view`; for another suffix.
+        As `scene_view`; for another suffix.
     """
-    formats.export(view(scene, paths, **looks), path)
+    formats.write_view(scene_view(scene, paths, **looks), path)
 
 
 def _interactive(scene: Scene | Bench, paths: Several, looks: Looks) -> View:
     """A view with phases at many wavelengths, and of a bench with an image for each phase step."""
-    found = view(scene, paths, sweep=SWEEP, **looks)
+    found = scene_view(scene, paths, sweep=SWEEP, **looks)
     frames, wavelength = None, looks.get("wavelength")
     if isinstance(scene, Bench) and looks.get("image") is None and wavelength is not None:
         frames = _binned(scene.phase_steps(wavelength, STEPS))

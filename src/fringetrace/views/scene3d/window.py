@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from fringetrace.core import nm
-from fringetrace.views.scene3d.describe import told
+from fringetrace.views.scene3d.describe import describe_polyline
 from fringetrace.views.scene3d.layout import apart
 from fringetrace.views.scene3d.palette import WAYS
-from fringetrace.views.scene3d.vtk import Plotter, View, chip, clip, draw, draw_rays, empty, legs
+from fringetrace.views.scene3d.vtk import Plotter, View, chip, clip_plane, draw, draw_rays, empty, path_lines
 
 HELP = "right click on a ray: its path;  c: colours;  p: clipping plane;  r: whole scene;  q: close"
 # Where sliders are: their left and right ends, from below; parts of the window.
@@ -54,7 +54,7 @@ class Window:
         """
         self.view = replace(self.view, **parts)
         if self.rays is not None:
-            self.rays.copy_from(legs(self.view))
+            self.rays.copy_from(path_lines(self.view))
         if "step" in parts and self.view.frames is not None and self.pixels is not None:
             count = len(self.view.frames)
             frame = self.view.frames[round(self.view.step * count / (2.0 * np.pi)) % count]
@@ -114,7 +114,7 @@ class Window:
         shown = self.view.strands
         assert shown is not None
         self.picked = number
-        text = told(shown, number, self.view.wavelength, self.view.step)
+        text = describe_polyline(shown, number, self.view.wavelength, self.view.step)
         note = self.plotter.add_text(
             text,
             position=(0.01, 0.03),
@@ -125,7 +125,7 @@ class Window:
             font="courier",
         )
         note.prop.background_color, note.prop.background_opacity = "white", 0.85
-        data = legs(self.view)
+        data = path_lines(self.view)
         mine = np.flatnonzero(np.asarray(data.cell_data["strand"]) == number)
         if len(mine):
             self.plotter.add_mesh(
@@ -150,16 +150,16 @@ class Window:
         if self.planes:
             self.planes.pop()
             self.plotter.clear_plane_widgets()
-            clip(self.plotter, None, None)
+            clip_plane(self.plotter, None, None)
             return
 
         def moved(normal: Any, origin: Any) -> None:
-            clip(self.plotter, np.asarray(normal), np.asarray(origin))
+            clip_plane(self.plotter, np.asarray(normal), np.asarray(origin))
 
         self.planes.append(self.plotter.add_plane_widget(moved, normal="-y", color="#606060"))
 
 
-def furnished(view: View, plotter: Plotter) -> Window:
+def furnish(view: View, plotter: Plotter) -> Window:
     """A view in a plotter, with all its sliders and keys.
 
     Parameters
@@ -221,9 +221,9 @@ def _sliders(window: Window) -> None:
         )  # fmt: skip
 
 
-def received() -> None:
+def receive() -> None:
     """In a process of its own: open a window with the view that comes on standard input."""
     plotter = empty((400, 300), off_screen=False)
     view, plotter.window_size = pickle.load(sys.stdin.buffer)
-    furnished(view, plotter)
+    furnish(view, plotter)
     plotter.show()

@@ -1,1 +1,0 @@
-from .wavefronts import Wavefronts as Wavefronts, reconstruct as reconstruct
