@@ -10,7 +10,7 @@ import numpy as np
 
 from fringetrace.core import Array, FloatArray, checked_wavelength
 from fringetrace.scene import Beam
-from fringetrace.tracing import Fate, Paths, at_wavelength, trace
+from fringetrace.tracing import Paths, at_wavelength, retrace
 
 # Rays along the longer side that are followed again, bounce by bounce; prime: not in step with facets.
 PROBES = 53
@@ -137,12 +137,7 @@ def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
         Followed for as many bounces as any path of `paths` that reached the CCD, and as faint.
     """
     assert isinstance(paths.source, Beam)
-    bounces = int(paths.bounces[paths.fate == Fate.DETECTED].max(initial=0))
-    beam = replace(paths.source, shape=shape)
-    return trace(
-        paths.scene, beam, paths.ccd, wavelength=paths.wavelength, max_bounces=bounces,
-        min_amplitude=paths.min_amplitude, record=record,
-    )  # fmt: skip
+    return retrace(paths, replace(paths.source, shape=shape), record=record)
 
 
 def _shape(paths: Paths) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -135,6 +136,8 @@ class Paths:
     bend: FloatArray | None = None
     contradictions: npt.NDArray[np.int64] | None = None
     min_amplitude: float = 1e-6
+    # what is worked out from the paths once, such as their wavefronts
+    derived: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.ray)
@@ -155,7 +158,7 @@ class Paths:
         return replace(self, **chosen)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {"derived": {}}
 
     @cached_property
     def detected(self) -> Paths:
