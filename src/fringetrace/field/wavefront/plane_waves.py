@@ -16,7 +16,7 @@ from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
 from fringetrace.optics import refract
 from fringetrace.scene import CCD, Beam, Surface
-from fringetrace.tracing import Paths, components, indices, landed
+from fringetrace.tracing import Paths, Segments, components, landed
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,25 +83,22 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
     assert paths.starts is not None
+    assert paths.branch is not None
     u, v, direction = frame(beam.direction, beam.up, "Beam")
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
     count = paths.bounces[row]
     legs = paths.points[row, 2 : count + 1] - paths.starts[row, 1:count]
     onward = np.concatenate([legs, paths.direction[row, None]])
-    index = indices(paths.where(np.array([row])))[0]
+    index = Segments.of(paths.where(np.array([row]))).index[0]
     for k, (surface, normal) in enumerate(_met(paths, row)):
-        leaving = onward[k] / np.linalg.norm(onward[k])
-        turned = direction - 2.0 * (direction @ normal) * normal
-        bent = refract(direction, normal, index[k], index[k + 1])
-        if hasattr(surface.interface, "act"):
-            bent = leaving
-        # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
-        mirror = getattr(surface.interface, "transmission", None) == 0.0
-        # NaN where light is totally reflected
-        if mirror or not np.linalg.norm(leaving - bent) <= np.linalg.norm(leaving - turned):
+        if paths.branch[row, k] == 0:
             across = across - 2.0 * np.outer(normal, normal @ across)
-            direction = turned
-        elif bent is not direction:
+            direction = direction - 2.0 * (direction @ normal) * normal
+            continue
+        bent = refract(direction, normal, index[k], index[k + 1])
+        if surface.element is not None:
+            bent = onward[k] / np.linalg.norm(onward[k])
+        if bent is not direction:
             # the step along the surface is the same on both sides
             across = across - np.outer(direction, (normal @ across) / (normal @ direction))
             direction = bent
@@ -119,7 +116,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
         matrix=matrix,
         start=start,
         path=float(length[0]),
-        gradient=index[-1] * np.array([direction @ right, direction @ up]) * ccd.pitch,
+        gradient=index[count] * np.array([direction @ right, direction @ up]) * ccd.pitch,
         amplitude=components(paths.where(np.array([row])), ccd)[:, 0] * size,
     )
 
