@@ -7,11 +7,13 @@ python benchmarks/precision.py --write     and write its section of docs/accurac
 from __future__ import annotations
 
 import sys
-
-import pages
+from pathlib import Path
 
 from fringetrace import views
 from fringetrace.validation import work_precision
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 PICTURE = "images/work_precision.png"
 

@@ -19,16 +19,19 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-import pages
 import scenes
 
 import fringetrace as ft
 from fringetrace import mm, nm
 from fringetrace.tracing.batch import part
 from fringetrace.tracing.intersect.embree import build
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 WAVE = 633 * nm
 ROUNDS = 5

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
-import pages
 
 import fringetrace as ft
 from fringetrace import mm, nm
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 WAVELENGTH = 633 * nm
 FOCAL, HEIGHT, SIDE, PIXELS = 50 * mm, 20 * mm, 2 * mm, 1024

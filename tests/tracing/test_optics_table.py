@@ -6,11 +6,11 @@ import pickle
 import glass
 import numpy as np
 import pytest
+from fringetrace.instruments.rig import Rig
 
 import fringetrace as ft
 from fringetrace import nm, um
 from fringetrace.geometry import forms, shapes
-from fringetrace.instruments.rig import Rig
 from fringetrace.optics import materials, polarisers
 from fringetrace.optics.films import Film
 from fringetrace.optics.materials.dispersion import Table

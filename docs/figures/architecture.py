@@ -1,6 +1,6 @@
 """Figure of docs/architecture.md: its three chains of functions, drawn from the page's own tables.
 
-python docs/architecture.py   writes docs/images/architecture.png
+python docs/figures/architecture.py   writes docs/images/architecture.png
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[1]
 CHAIN = re.compile(r"^## (One .*?)\n(.*?)(?=^## )", flags=re.DOTALL | re.MULTILINE)
 STEP = re.compile(r"^\| ([^|]+) \| `([\w/]+)/(\w+\.py: [\w.]+)` \|$", flags=re.MULTILINE)
 LINE = 44  # characters of a box's text on a line
