@@ -116,7 +116,7 @@ def shut(side: int) -> Skip:
     blocked = bench.shut("reference")
     blocked.trace(threads=1)
 
-    def sample(one: ft.instruments.Bench) -> Callable:
+    def sample(one: ft.instruments.Interferometer) -> Callable:
         def found() -> list[np.ndarray]:
             fresh = replace(one)
             fresh.trace(threads=1)
@@ -260,7 +260,7 @@ def stepped(side: int) -> Skip:
     """Phase steps without another trace or sum."""
     flat = ft.shapes.plate(16 * mm, 16 * mm)
 
-    def tilted(piston: float = 0.0) -> ft.instruments.Bench:
+    def tilted(piston: float = 0.0) -> ft.instruments.Interferometer:
         return ft.instruments.michelson(
             flat, aperture=6 * mm, pixels=(side, side), reference_tilt=(2e-5, 0.0), piston=piston
         )
@@ -294,7 +294,7 @@ def differences(side: int) -> Skip:
         image,
         "fringes",
         lambda real: lambda slope, _: real(slope, True),
-        *(f"field.{file}" for file in files),
+        *files,
     )
     return Skip("irradiance: sampled for fringes, not for the carrier", "tilted flats", image, carrier)
 

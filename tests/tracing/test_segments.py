@@ -55,7 +55,7 @@ def test_hits_are_off_their_facets_by_roundings():
     for form in (None, SPHERE):
         (met,) = segments.met(ball(form))
         assert met.formed.all() == (form is not None)
-        offset = np.linalg.norm(path_errors.off(met).astype(float), axis=1)
+        offset = np.linalg.norm(path_errors.hit_offsets(met).astype(float), axis=1)
         assert 0.0 < offset.max() < 4 * EPS
 
 
@@ -64,7 +64,9 @@ def test_a_hit_that_is_off_is_seen():
     (met,) = segments.met(paths)
     normal = segments.normals(met)
     lifted = replace(met, point=met.point + 5 * nm * normal)
-    np.testing.assert_allclose(path_errors.off(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS)
+    np.testing.assert_allclose(
+        path_errors.hit_offsets(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS
+    )
 
 
 def test_a_mirror_moved_along_its_normal_changes_the_path_by_twice_the_cosine():
@@ -124,11 +126,11 @@ def test_patches_bend_like_the_ball_they_were_made_for():
 
 def test_facets_leave_out_what_a_form_gives():
     (plain,) = segments.met(ball(None))
-    height, lean = path_errors.flattened(plain)
+    height, lean = path_errors.flattening(plain)
     assert np.linalg.norm(height, axis=1).max() == pytest.approx(0.1 * 4.528e-3, rel=0.1)
     assert np.linalg.norm(lean, axis=1).max() > 0.05
     (formed,) = segments.met(ball(SPHERE))
-    assert not np.any(path_errors.flattened(formed))
+    assert not np.any(path_errors.flattening(formed))
 
 
 @pytest.mark.parametrize("longer", [0.0, 3 * nm])

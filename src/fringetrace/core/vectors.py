@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core.units import Array, FloatArray
+from fringetrace.core.units import Array, FloatArray, filled
 
 # A matrix that changes lengths by more than this part was not meant as a rotation.
 STRETCH = 1e-9
@@ -32,7 +32,7 @@ def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
         If it is not three numbers, or one is not finite.
     """
     try:
-        vector = np.array(value, dtype=np.float64)
+        vector = filled(value).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what}: expected 3 numbers, got {value!r}") from error
     if vector.shape != (3,):
@@ -170,7 +170,7 @@ def checked_rotation(value: npt.ArrayLike, what: str) -> FloatArray:
     ValueError
         If the shape is wrong, or the matrix would change lengths or swap left and right.
     """
-    matrix = np.asarray(value, dtype=np.float64)
+    matrix = filled(value)
     if matrix.shape != (3, 3):
         raise ValueError(f"{what}: expected a rotation matrix of shape (3, 3), got shape {matrix.shape}")
     stretch = np.abs(matrix @ matrix.T - np.eye(3)).max()

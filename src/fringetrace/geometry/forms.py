@@ -21,6 +21,7 @@ from fringetrace.core import (
     checked_vector,
     component,
     dot,
+    filled,
     unit,
 )
 from fringetrace.geometry.implicit import EPSILON, Fit, fit_level
@@ -249,7 +250,7 @@ class HeightField:
     turn: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        heights = np.array(self.heights, dtype=np.float64)
+        heights = filled(self.heights).copy()
         if heights.ndim != 2 or min(heights.shape) < 4 or not np.isfinite(heights).all():
             raise ValueError(
                 f"HeightField heights: expected 4 x 4 finite numbers or more, got shape {heights.shape}"
@@ -324,7 +325,7 @@ class Smooth:
     def __post_init__(self) -> None:
         if self.normals is None:
             return
-        normals = np.array(self.normals, dtype=np.float64)
+        normals = filled(self.normals).copy()
         if (
             normals.ndim != 2
             or normals.shape[1] != 3

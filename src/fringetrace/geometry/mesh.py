@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, checked_rotation, checked_vector
+from fringetrace.core import Array, FloatArray, checked_rotation, checked_vector, filled
 
 # A face is degenerate when its height is below this part of its longest side: less than what
 # float64 coordinates can express, and far below any needle that still has a normal.
@@ -30,7 +30,7 @@ def _named(indices: Array, limit: int = 5) -> str:
 
 def _checked_vertices(value: Any, name: str) -> FloatArray:
     try:
-        vertices = np.array(value, dtype=np.float64)
+        vertices = filled(value).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name} vertices: expected numbers of shape (v, 3), got {error}") from error
     if vertices.ndim != 2 or vertices.shape[1] != 3:
@@ -54,6 +54,9 @@ def _checked_faces(value: Any, count: int, name: str) -> npt.NDArray[np.int64]:
         raise ValueError(f"{name} faces: expected at least one triangle, got none")
     if raw.ndim != 2 or raw.shape[1] != 3:
         raise ValueError(f"{name} faces: expected shape (f, 3), got {raw.shape}")
+    if np.ma.is_masked(value):
+        masked = int(np.ma.getmaskarray(value).sum())
+        raise ValueError(f"{name} faces: expected whole triangles, got {masked} masked corners")
     if not np.issubdtype(raw.dtype, np.integer):
         raise ValueError(f"{name} faces: expected integers, got {raw.dtype}")
     bad = np.flatnonzero((raw < 0).any(axis=1) | (raw >= count).any(axis=1))

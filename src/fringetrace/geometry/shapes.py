@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_length, unit
+from fringetrace.core import FloatArray, checked_length, filled, unit
 from fringetrace.geometry.mesh import Mesh
 from fringetrace.geometry.triangles import IndexArray, doubled_area, self_crossing, triangulate, weld
 
@@ -58,7 +58,7 @@ def height_map(z: npt.ArrayLike, pitch: float | tuple[float, float], *, name: st
     Parameters
     ----------
     z : (rows, columns) float64, metres
-        NaN: a hole.
+        NaN, or masked as in numpy.ma: a hole.
     pitch : float, or (along x, along y), metres
         Distance of neighbouring samples.
     name : str
@@ -73,7 +73,7 @@ def height_map(z: npt.ArrayLike, pitch: float | tuple[float, float], *, name: st
     ValueError
         If there are fewer than 2 x 2 samples or no three valid neighbours, or a pitch is not positive.
     """
-    heights = np.asarray(z, dtype=np.float64)
+    heights = filled(z)
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise ValueError(f"{name}: expected 2 x 2 samples or more, got shape {heights.shape}")
     pitch_x, pitch_y = _checked_pitch(pitch, f"{name} pitch")
@@ -128,7 +128,7 @@ def extrude(polyline: npt.ArrayLike, depth: float, *, closed: bool = False, name
         For fewer than 2 points (3 if closed), points that are not finite, neighbours that
         coincide, a depth that is not positive, a closed line that meets itself.
     """
-    points = np.array(polyline, dtype=np.float64)
+    points = filled(polyline).copy()
     least = 3 if closed else 2
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < least:
         raise ValueError(f"{name}: expected points of shape (k, 2), k from {least}, got {points.shape}")

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace.core import FloatArray, checked_length, checked_wavelength, nm, whole
+from fringetrace.core import FloatArray, checked_length, checked_wavelength, filled, nm, whole
 
 METROPRO, MX = KINDS = (".dat", ".datx")
 # First four bytes of the three versions of MetroPro's format, and of HDF5, which is Mx's.
@@ -120,7 +120,7 @@ def write_height_map(
     Parameters
     ----------
     z : (rows, columns) float64, metres
-        Row 0 is the bottom one; what is not finite becomes "no data".
+        Row 0 is the bottom one; what is not finite, or masked as in numpy.ma, becomes "no data".
     pitch : float, metres
     path : path-like
         Its suffix says the kind.
@@ -132,7 +132,7 @@ def write_height_map(
     ValueError
         If the kind is another one, the array has not two axes, or heights are too large to be counted.
     """
-    heights = np.asarray(z, dtype=np.float64)
+    heights = filled(z)
     if heights.ndim != 2 or heights.size == 0:
         raise ValueError(f"height map: expected shape (rows, columns), got {heights.shape}")
     suffix = Path(path).suffix.lower()

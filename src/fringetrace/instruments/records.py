@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import Array, tables
+from fringetrace.core import Array, filled, tables
 from fringetrace.scene import pixel_centres
 
 if TYPE_CHECKING:
@@ -53,6 +53,12 @@ def coordinates(shape: tuple[int, int], pitch: float) -> dict[str, Any]:
     }
 
 
+def _without_mask(values: Any) -> Array:
+    """An array, of a type that knows NaN where there was a mask."""
+    masked = np.ma.is_masked(values)
+    return filled(values, np.result_type(values, np.float64)) if masked else np.asarray(values)
+
+
 def dataset(
     images: Mapping[str, Any], pitch: float, axes: tables.Coordinates | None = None, **attributes: Any
 ) -> Dataset:
@@ -83,7 +89,7 @@ def dataset(
     named: dict[str, tuple[tuple[str, ...], Array, dict[str, str]]] = {}
     for name, given in images.items():
         leading, values = given if isinstance(given, tuple) else ((), given)
-        named[name] = ((*leading, *IMAGE), np.asarray(values), NOTES.get(name, {}))
+        named[name] = ((*leading, *IMAGE), _without_mask(values), NOTES.get(name, {}))
     shapes = {values.shape[-2:] for _, values, _ in named.values()}
     if len(shapes) != 1 or any(values.ndim != len(dims) for dims, values, _ in named.values()):
         found = ", ".join(f"{name} {values.shape}" for name, (_, values, _) in named.items())

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelength
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, filled
 from fringetrace.optics.materials.material import Material
 from fringetrace.optics.materials.named_materials import as_material
 
@@ -143,17 +143,19 @@ def _incidence(
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
 ) -> tuple[tuple[int, ...], dict[str, Any]]:
-    """Shape of the answer, and flat arrays of sine2, first, layers, last and k0."""
+    """Shape of the answer, and flat arrays of q1, first, layers, last and k0, as in `layers.stack`."""
+    from fringetrace.optics.film_kernels import normal_part
+
     theta, w = np.broadcast_arrays(
         np.asarray(angle, dtype=np.float64), np.asarray(wavelength, dtype=np.float64)
     )
     _checked_angles(theta)
     flat = np.ascontiguousarray(w.reshape(-1))
     n1, n2 = (as_material(m, "half space").index(flat) for m in (first, last))
-    sine2 = (n1 * np.sin(theta.reshape(-1))) ** 2
     layers = (film or Film()).indices(flat)
     return theta.shape, {
-        "sine2": sine2, "first": n1, "layers": layers, "last": n2, "k0": 2.0 * math.pi / flat
+        "q1": normal_part(n1, theta.reshape(-1)), "first": n1, "layers": layers, "last": n2,
+        "k0": 2.0 * math.pi / flat
     }  # fmt: skip
 
 
@@ -191,7 +193,7 @@ def coefficients(
 
     shape, wave = _incidence(film, first, last, angle, wavelength)
     thickness = (film or Film()).thickness
-    out = stacks(wave["sine2"], wave["first"], wave["layers"], thickness, wave["last"], wave["k0"])
+    out = stacks(wave["q1"], wave["first"], wave["layers"], thickness, wave["last"], wave["k0"])
     return Amplitudes(*out.reshape(4, *shape))
 
 
@@ -231,7 +233,7 @@ def transmittance(
 
     shape, wave = _incidence(film, first, last, angle, wavelength)
     amplitudes = coefficients(film, first, last, angle, wavelength)
-    s, p = shares(wave["sine2"], wave["first"], wave["last"]).reshape(2, *shape)
+    s, p = shares(wave["q1"], wave["first"], wave["last"]).reshape(2, *shape)
     return PolarisedPowers(s * np.abs(amplitudes.ts) ** 2, p * np.abs(amplitudes.tp) ** 2)
 
 
@@ -253,16 +255,17 @@ def fresnel(first: npt.ArrayLike, last: npt.ArrayLike, angle: npt.ArrayLike) -> 
     Raises
     ------
     ValueError
-        If an angle is not from 0 to pi/2.
+        If an angle is not from 0 to pi/2, or an index is not finite or 0.
     """
-    from fringetrace.optics.film_kernels import stacks
+    from fringetrace.optics.film_kernels import normal_part, stacks
 
-    n1, n2, theta = np.broadcast_arrays(
-        np.asarray(first, dtype=np.complex128), np.asarray(last, dtype=np.complex128),
-        np.asarray(angle, dtype=np.float64),
-    )  # fmt: skip
+    indices = [filled(n, np.complex128) for n in (first, last)]
+    for n in indices:
+        if not (np.isfinite(n) & (n != 0.0)).all():
+            raise ValueError(f"fresnel: expected finite indices n + i kappa, not 0, got {n}")
+    n1, n2, theta = np.broadcast_arrays(*indices, np.asarray(angle, dtype=np.float64))
     flat = _checked_angles(theta).reshape(-1)
     n1, n2, shape = np.ascontiguousarray(n1.reshape(-1)), np.ascontiguousarray(n2.reshape(-1)), theta.shape
     none = np.empty((len(flat), 0), np.complex128)
-    sine2 = (n1 * np.sin(flat)) ** 2
-    return Amplitudes(*stacks(sine2, n1, none, np.empty(0), n2, np.ones(len(flat))).reshape(4, *shape))
+    q1 = normal_part(n1, flat)
+    return Amplitudes(*stacks(q1, n1, none, np.empty(0), n2, np.ones(len(flat))).reshape(4, *shape))

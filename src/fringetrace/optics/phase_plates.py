@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, frame
+from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, filled, frame
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -174,7 +174,7 @@ class PhasePlate:
             if (pitch is None) == (self.gradient is None):
                 raise ValueError("PhasePlate: expected either a gradient or a pitch beside a function")
             return FormulaRelief(self.opd, self.gradient, pitch)
-        samples = np.array(self.opd, dtype=np.float64)
+        samples = filled(self.opd).copy()
         if samples.ndim != 2 or not samples.size or not np.isfinite(samples).all():
             raise ValueError(f"PhasePlate opd: expected a table of finite metres, got shape {samples.shape}")
         if pitch is None or self.gradient is not None:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot
+from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, filled
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -249,7 +249,7 @@ class JonesPlate:
 
 def _checked_matrix(value: Any) -> ComplexArray:
     try:
-        matrix = np.array(value, dtype=np.complex128)
+        matrix = filled(value, np.complex128).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"JonesPlate matrix: expected 2 x 2 complex numbers, got {value!r}") from error
     if matrix.shape != (2, 2) or not np.isfinite(matrix).all():

@@ -1,5 +1,7 @@
 """Height from wrapped phase: unwrapping, synthetic wavelength, piston and tilt removal.
 
+What a numpy.ma array masks is unknown, and comes out as NaN.
+
 References
 ----------
 - Cheng 1984: Y.-Y. Cheng, J. C. Wyant, Applied Optics 23, 4539.
@@ -13,7 +15,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_wavelength
+from fringetrace.core import FloatArray, checked_wavelength, filled
 from fringetrace.phase.stepping import (
     carre,
     four_step,
@@ -58,7 +60,7 @@ def wrap(phase: npt.ArrayLike) -> FloatArray:
     float64, radians in (-pi, pi], shape of `phase`
     """
     turn = 2.0 * math.pi
-    folded = np.fmod(np.asarray(phase, dtype=np.float64), turn)
+    folded = np.fmod(filled(phase), turn)
     folded = np.where(folded > math.pi, folded - turn, folded)
     return np.where(folded <= -math.pi, folded + turn, folded)
 
@@ -67,11 +69,11 @@ def _checked_map(
     values: npt.ArrayLike, mask: npt.ArrayLike | None, what: str
 ) -> tuple[FloatArray, BoolArray]:
     """A map, and which of its pixels count."""
-    pixels = np.asarray(values, dtype=np.float64)
+    pixels = filled(values)
     if pixels.ndim != 2:
         raise ValueError(f"{what}: expected a map of shape (rows, columns), got shape {pixels.shape}")
     valid = np.isfinite(pixels)
-    if mask is not None:
+    if mask is not None and mask is not np.ma.nomask:
         left_out = np.asarray(mask, dtype=np.bool_)
         if left_out.shape != pixels.shape:
             raise ValueError(f"{what} mask: expected shape {pixels.shape}, got {left_out.shape}")
@@ -133,6 +135,27 @@ def unwrap(phase: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArra
     return result
 
 
+def optical_path(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
+    """Optical path difference of a phase difference: phase * wavelength / (2 pi).
+
+    Parameters
+    ----------
+    phase : float64, radians, any shape
+    wavelength : float, metres
+
+    Returns
+    -------
+    float64, metres, shape of `phase`
+
+    Raises
+    ------
+    ValueError
+        If the wavelength is not a positive length.
+    """
+    scale = checked_wavelength(wavelength) / (2.0 * math.pi)
+    return np.asarray(filled(phase) * scale, dtype=np.float64)
+
+
 def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
     """Height of a reflecting surface from its phase, phase * wavelength / (4 pi), towards the light.
 
@@ -151,8 +174,7 @@ def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
     ValueError
         If the wavelength is not a positive length.
     """
-    scale = checked_wavelength(wavelength) / (4.0 * math.pi)
-    return np.asarray(np.asarray(phase, dtype=np.float64) * scale, dtype=np.float64)
+    return np.asarray(0.5 * optical_path(phase, wavelength), dtype=np.float64)
 
 
 def synthetic_wavelength(wavelength1: float, wavelength2: float) -> float:
@@ -199,7 +221,7 @@ def two_wavelength(
         erfc(pi / (sqrt(2) sigma q)), q**2 = (L / l - 1)**2 + (L / l)**2, l the shorter wavelength.
     """
     beat = synthetic_wavelength(wavelength1, wavelength2)
-    fine, other = np.asarray(phase1, dtype=np.float64), np.asarray(phase2, dtype=np.float64)
+    fine, other = filled(phase1), filled(phase2)
     shorter = float(wavelength1)
     if wavelength1 > wavelength2:
         fine, other, shorter = other, fine, float(wavelength2)

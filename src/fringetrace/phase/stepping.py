@@ -1,7 +1,8 @@
 """Phase stepping: interferogram frames to wrapped phase.
 
 Frames are I_k = A + B cos(phi + alpha_k), with the steps alpha_k added to the reference arm. Phases that
-cannot be determined (no modulation above rounding, frames that are not finite) are NaN.
+cannot be determined (no modulation above rounding, frames that are not finite, or masked as in numpy.ma)
+are NaN.
 
 References
 ----------
@@ -21,7 +22,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray
+from fringetrace.core import FloatArray, filled
 
 # Sums of frames that cancel leave a few units in the last place of their largest term.
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
@@ -33,7 +34,7 @@ def _checked_frames(frames: npt.ArrayLike, what: str, count: int | None = None) 
     """Real frames along the first axis: `count` of them, or 3 or more."""
     if np.iscomplexobj(frames):
         raise ValueError(f"{what} frames: expected real intensities, got complex numbers; take |E|**2")
-    values = np.asarray(frames, dtype=np.float64)
+    values = filled(frames)
     found = len(values) if values.ndim else 0
     if found < 3 or (count is not None and found != count):
         expected = "3 or more" if count is None else str(count)
@@ -220,7 +221,7 @@ def least_squares(frames: npt.ArrayLike, steps: npt.ArrayLike) -> FloatArray:
         fewer than three steps differ.
     """
     values = _checked_frames(frames, "least_squares")
-    alpha = np.asarray(steps, dtype=np.float64)
+    alpha = filled(steps)
     if alpha.shape != (len(values),) or not np.isfinite(alpha).all():
         raise ValueError(
             f"least_squares steps: expected {len(values)} finite angles in radians, one a frame, "

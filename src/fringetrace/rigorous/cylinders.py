@@ -20,12 +20,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole
 from fringetrace.rigorous.cylindrical_waves import (
     CONDUCTOR as CONDUCTOR,
     Index,
     Polarisation,
     boundary,
+    checked_index,
+    damped,
     hankel,
     indices_at,
     truncation,
@@ -50,7 +52,7 @@ class Cylinders:
     Raises
     ------
     ValueError
-        If shapes do not match, a radius is not positive, or cylinders overlap.
+        If shapes do not match, a radius is not positive, an index is none, or cylinders overlap.
     """
 
     centres: ArrayLike
@@ -62,11 +64,17 @@ class Cylinders:
         centres = np.atleast_2d(np.asarray(self.centres, np.float64))
         if centres.ndim != 2 or centres.shape[1] != 2 or len(centres) == 0:
             raise ValueError(f"Cylinders: expected centres of shape (n, 2), got {centres.shape}")
+        if not np.isfinite(centres).all():
+            raise ValueError("Cylinders: expected finite centres in metres, got NaN or infinity")
         radii = np.broadcast_to(np.asarray(self.radii, np.float64), (len(centres),))
-        if not np.all(radii > 0):
+        if not np.all((radii > 0) & (radii < np.inf)):
             raise ValueError(f"Cylinders: expected positive radii in metres, got {radii.min()}")
-        if isinstance(self.index, Sequence) and len(self.index) != len(centres):
-            raise ValueError(f"Cylinders: expected 1 or {len(centres)} indices, got {len(self.index)}")
+        several = _each(self.index)
+        if len(several) not in (1, len(centres)):
+            raise ValueError(f"Cylinders: expected 1 or {len(centres)} indices, got {len(several)}")
+        for index in (*several, self.host):
+            if not callable(index):
+                checked_index(index, "Cylinders")
         _check_apart(centres, radii)
         object.__setattr__(self, "centres", centres)
         object.__setattr__(self, "radii", radii)
@@ -185,11 +193,11 @@ def scatter(
         If the wavelength is not positive, the polarisation unknown, the host absorbs, or there are too many
         cylinders off a grid.
     """
-    if not wavelength > 0:
+    if not 0 < wavelength < math.inf:
         raise ValueError(f"Wavelength: expected a positive length in metres, got {wavelength}")
     k = _wavenumber(cylinders, wavelength)
     radii = np.asarray(cylinders.radii)
-    orders = truncation(k * radii.max()) if orders is None else orders
+    orders = truncation(k * radii.max()) if orders is None else checked_whole(orders, 0, "Orders")
     response, weight, _ = boundary(
         radii,
         _indices(cylinders, wavelength),
@@ -198,7 +206,7 @@ def scatter(
         polarisation,
         orders,
     )
-    angles = np.atleast_1d(np.asarray(angle, np.float64))
+    angles = np.atleast_1d(checked_angles(angle, "Angle"))
     incident = _incident(cylinders, k, angles, orders)
     exciting = solve(np.asarray(cylinders.centres), k, response, weight, incident)
     return Scattered(cylinders, wavelength, polarisation, angles, exciting, response * exciting)
@@ -217,7 +225,7 @@ def amplitude(scattered: Scattered, direction: ArrayLike) -> ComplexArray:
     -------
     (q, t) complex128
     """
-    direction = np.atleast_1d(np.asarray(direction, np.float64))
+    direction = np.atleast_1d(checked_angles(direction, "Direction"))
     n, k = scattered.orders, scattered.wavenumber
     centres = np.asarray(scattered.cylinders.centres)
     turned = scattered.outgoing * (-1j) ** n
@@ -288,8 +296,6 @@ def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
 
 def _inner_field(scattered: Scattered, j: int, points: FloatArray) -> ComplexArray:
     """The wave inside cylinder j at points (p, 2) in it."""
-    from scipy.special import jve
-
     cylinders, half = scattered.cylinders, int(scattered.orders[-1])
     index = _indices(cylinders, scattered.wavelength)[j]
     if np.isinf(index):
@@ -299,8 +305,7 @@ def _inner_field(scattered: Scattered, j: int, points: FloatArray) -> ComplexArr
     offset = points - np.asarray(cylinders.centres)[j]
     distance, azimuth = np.hypot(*offset.T)[:, None], np.arctan2(offset[:, 1], offset[:, 0])[:, None]
     k = 2.0 * math.pi * index / scattered.wavelength
-    damped = np.exp(abs(k.imag) * (distance - radius))  # jve and `inner` are free of exp(|Im|)
-    wave = jve(scattered.orders, k * distance) * damped * np.exp(1j * azimuth * scattered.orders)
+    wave = damped(scattered.orders, k * distance[:, 0], k * radius) * np.exp(1j * azimuth * scattered.orders)
     found: ComplexArray = (scattered.exciting[:, j] * inner) @ wave.T
     return found
 
@@ -322,10 +327,16 @@ def _wavenumber(cylinders: Cylinders, wavelength: float) -> float:
     return 2.0 * math.pi * host.real / wavelength
 
 
+def _each(index: Index | Sequence[Index]) -> Sequence[Index]:
+    """Indices of the cylinders, or one for all."""
+    if isinstance(index, np.ndarray) and index.ndim:
+        return list(index)
+    return index if isinstance(index, Sequence) and not isinstance(index, str) else [index]
+
+
 def _indices(cylinders: Cylinders, wavelength: float) -> ComplexArray:
     """Refractive index of each cylinder at a wavelength, (n,) complex128."""
-    several = cylinders.index if isinstance(cylinders.index, Sequence) else [cylinders.index]
-    values = [indices_at(index, np.asarray(wavelength)) for index in several]
+    values = [indices_at(index, np.asarray(wavelength)) for index in _each(cylinders.index)]
     return np.broadcast_to(np.asarray(values, np.complex128), (len(np.asarray(cylinders.centres)),))
 
 

@@ -14,6 +14,7 @@ from fringetrace.core import (
     Array,
     FloatArray,
     FringetraceWarning,
+    filled,
     nm,
     read_csv as load,
     um,
@@ -57,7 +58,7 @@ def _colour() -> Any:
 
 def _checked(wavelengths: npt.ArrayLike) -> FloatArray:
     """Wavelengths in nm, once they are known to be increasing and to cover what is seen."""
-    found = np.asarray(wavelengths, dtype=np.float64) / nm
+    found = filled(wavelengths) / nm
     if found.ndim != 1 or len(found) < 4:
         raise ValueError(f"wavelengths: expected shape (n,) with n of at least 4, got {found.shape}")
     if not (np.isfinite(found).all() and (np.diff(found) > 0.0).all()):
@@ -119,9 +120,9 @@ def illuminant(light: Illuminant, wavelengths: npt.ArrayLike) -> FloatArray:
     ValueError
         If the name is unknown, or the table is none.
     """
-    at = np.asarray(wavelengths, dtype=np.float64)
+    at = filled(wavelengths)
     if not isinstance(light, str):
-        own, power = (np.asarray(part, dtype=np.float64) for part in light)
+        own, power = (filled(part) for part in light)
         if own.ndim != 1 or own.shape != power.shape or not (np.diff(own) > 0.0).all() or power.min() < 0.0:
             raise ValueError("illuminant: expected increasing wavelengths and as many powers, none negative")
         return np.interp(at, own, power, left=0.0, right=0.0)
@@ -151,7 +152,7 @@ def observer(degrees: int, wavelengths: npt.ArrayLike) -> FloatArray:
     if degrees not in OBSERVERS:
         raise ValueError(f"observer: expected 2 or 10 degrees, got {degrees!r}")
     table = _colour().MSDS_CMFS[OBSERVERS[degrees]]
-    at = np.asarray(wavelengths, dtype=np.float64) / nm
+    at = filled(wavelengths) / nm
     columns = [np.interp(at, table.wavelengths, column, left=0.0, right=0.0) for column in table.values.T]
     return np.stack(columns, axis=-1)
 
@@ -291,7 +292,7 @@ def xyz(
         If samples do not follow from their neighbours: steps of wavelength have to be well below
         lambda^2 / D, D being the optical path difference, else fringes alias.
     """
-    values = np.asarray(reflectance, dtype=np.float64)
+    values = filled(reflectance)
     found = _checked(wavelengths)
     if values.ndim == 0 or values.shape[-1] != len(found):
         raise ValueError(f"reflectance: expected shape (..., {len(found)}), got {values.shape}")
@@ -325,7 +326,7 @@ def luminance(radiance: npt.ArrayLike, wavelengths: npt.ArrayLike, observer: int
         Of a spectral irradiance, W/(m^2 m): lux.
     """
     sums = _sums(_checked(wavelengths), None, observer)[:, 1]
-    return np.asarray(EFFICACY * nm * (np.asarray(radiance, dtype=np.float64) @ sums))
+    return np.asarray(EFFICACY * nm * (filled(radiance) @ sums))
 
 
 def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
@@ -339,7 +340,7 @@ def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
     -------
     (..., 2) float64, NaN for black
     """
-    values = np.asarray(xyz, dtype=np.float64)
+    values = filled(xyz)
     total = values.sum(axis=-1, keepdims=True)
     lit = total > 0.0
     return np.where(lit, values[..., :2] / np.where(lit, total, 1.0), np.nan)
@@ -383,7 +384,7 @@ def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Illuminant = "D65"
     """
     if gamut not in GAMUTS:
         raise ValueError(f"gamut: expected one of {', '.join(GAMUTS)}, got {gamut!r}")
-    colour, values = _colour(), np.asarray(xyz, dtype=np.float64)
+    colour, values = _colour(), filled(xyz)
     if illuminant != "D65":
         seen, shown = white(illuminant), white("D65")
         adaptation = colour.adaptation.matrix_chromatic_adaptation_VonKries(seen, shown, transform="Bradford")

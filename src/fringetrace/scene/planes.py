@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import FloatArray
+from fringetrace.core import (
+    FloatArray,
+)
 
 if TYPE_CHECKING:
     pass

@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import ROUNDED, ComplexArray, FloatArray, checked_direction, checked_vector, frame
+from fringetrace.core import (
+    ROUNDED,
+    ComplexArray,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    filled,
+    frame,
+)
 from fringetrace.scene.planes import Axes, checked_grid, checked_positive, checked_size
 
 if TYPE_CHECKING:
@@ -59,7 +67,7 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
 
 def _checked_jones(value: Any) -> ComplexArray:
     try:
-        vector = np.array(value, dtype=np.complex128)
+        vector: ComplexArray = filled(value, np.complex128).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
     size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan

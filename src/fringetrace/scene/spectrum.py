@@ -14,7 +14,7 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, nm
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, filled, nm
 
 # What the sum over a line may be off its integral, relative to the line.
 ERROR = 1e-6
@@ -44,9 +44,7 @@ class Spectrum:
     weights: FloatArray
 
     def __post_init__(self) -> None:
-        wavelengths, weights = (
-            np.atleast_1d(np.array(v, np.float64)) for v in (self.wavelengths, self.weights)
-        )
+        wavelengths, weights = (np.atleast_1d(filled(v).copy()) for v in (self.wavelengths, self.weights))
         if wavelengths.ndim != 1 or not wavelengths.size or wavelengths.shape != weights.shape:
             raise ValueError(
                 f"Spectrum: expected as many wavelengths as weights, at least one, got shapes "

@@ -11,7 +11,7 @@ import numpy as np
 
 from fringetrace.core import ComplexArray, FloatArray, parse_angle, parse_length, rotation
 from fringetrace.geometry import Mesh, meshes
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.optics import Material, materials
 from fringetrace.scenefile.schema import (
     Kind,
@@ -300,7 +300,7 @@ def _checked(make: Callable[[], Any], value: Mapping[str, Any], place: Place) ->
 
 
 def _recipe(value: dict[str, Any], place: Place) -> Recipe:
-    name, known = _named(value, None, kinds([Bench]), place)
+    name, known = _named(value, None, kinds([Interferometer]), place)
     rest = {key: item for key, item in value.items() if key != "type"}
     recipe = Recipe(name, _arguments(known, rest, place))
     _checked(lambda: recipe.bench, rest, place)

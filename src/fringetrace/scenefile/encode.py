@@ -12,7 +12,7 @@ import numpy as np
 
 from fringetrace.core import Array
 from fringetrace.geometry import Mesh, meshes
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.optics import Material, materials
 from fringetrace.scenefile.schema import Recipe, concrete, kinds, members, parameters
 from fringetrace.scenefile.toml import Path as Keys
@@ -101,7 +101,7 @@ def _plain(value: Any) -> bool | int | float | str:
 
 def _kind(recipe: Recipe) -> Callable[..., Any]:
     """The function that a recipe names."""
-    return kinds([Bench])[recipe.name]
+    return kinds([Interferometer])[recipe.name]
 
 
 def _refused(value: Any, keys: Keys) -> ValueError:

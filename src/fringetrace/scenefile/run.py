@@ -17,7 +17,7 @@ from fringetrace.accuracy import checks
 from fringetrace.core import Array, ComplexArray, FloatArray, FringetraceWarning, nm, staged, tables
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.geometry import write_height_map
-from fringetrace.instruments import Bench, Mark, records, tiff
+from fringetrace.instruments import Interferometer, Mark, records, tiff
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.scenefile.files import Experiment
 from fringetrace.tracing import Fate, Ledger, Paths, needs, trace
@@ -46,8 +46,8 @@ class Run:
         return self.derived[key]
 
     @property
-    def bench(self) -> Bench | None:
-        """The interferometer, if the setup is one."""
+    def bench(self) -> Interferometer | None:
+        """The ready bench, if it is one."""
         return None if self.experiment.bench is None else self.experiment.bench.bench
 
     @property
@@ -344,7 +344,7 @@ def scene_to_draw(
     beams = [replace(beam, shape=few(beam.shape, rays)) for beam in current.beams]
     paths = [current.traced(beam, ccd, wavelength, record=True) for beam in beams]
     image = None if ccd is None or wavelength is None or not beams else current.image(wavelength)
-    reference = None if bench is None else bench.mark or Mark(bench.reference)
+    reference = None if bench is None else bench.arms.reference
     return experiment.scene, paths, image, reference
 
 

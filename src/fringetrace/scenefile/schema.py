@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from fringetrace.core import FloatArray
 from fringetrace.geometry import Form, Mesh
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.optics import Element, Film, Material, PhasePlate, Retarder
 from fringetrace.scenefile.toml import choice
 
@@ -31,8 +31,8 @@ SOURCES = (
 )  # fmt: skip
 # What annotations name that their own files import for type checkers only, and what functions return.
 NAMES: dict[str, Any] = {
-    "Bench": Bench, "Element": Element, "Film": Film, "Form": Form, "Material": Material, "Mesh": Mesh,
-    "PhasePlate": PhasePlate, "Retarder": Retarder,
+    "Interferometer": Interferometer, "Element": Element, "Film": Film, "Form": Form, "Material": Material,
+    "Mesh": Mesh, "PhasePlate": PhasePlate, "Retarder": Retarder,
 }  # fmt: skip
 _SECTION = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", re.DOTALL | re.MULTILINE)
 _SLOT = re.compile(r"^(\*?\w+(?:, \*?\w+)*) : (.*)$", re.MULTILINE)
@@ -181,7 +181,7 @@ def _vocabulary() -> dict[str, list[tuple[Kind, type]]]:
     found: dict[str, list[tuple[Kind, type]]] = {}
     for name, value in (pair for source in SOURCES for pair in _offered(source)):
         made = None
-        if value is Bench:  # benches are made by the functions that return one
+        if value is Interferometer:  # benches are made by the functions that return one
             continue
         if inspect.isclass(value) and dataclasses.is_dataclass(value):
             made = value
@@ -200,7 +200,7 @@ def _kinds(some: tuple[Any, ...]) -> dict[str, Kind]:
         for kind, made in candidates
         if any(_fits(made, member) for member in some)
     }
-    return {**known, **{part.__name__: part for part in concrete(some) if part not in (Bench, Mesh)}}
+    return {**known, **{part.__name__: part for part in concrete(some) if part not in (Interferometer, Mesh)}}
 
 
 def kinds(some: Sequence[Any]) -> dict[str, Kind]:
@@ -255,7 +255,7 @@ class Recipe:
     arguments: Mapping[str, Any]
 
     def __post_init__(self) -> None:
-        known = kinds([Bench])
+        known = kinds([Interferometer])
         if self.name not in known:
             raise ValueError(f"bench type: {choice(self.name, known)}")
         for name in self.arguments:
@@ -263,7 +263,7 @@ class Recipe:
                 raise ValueError(f"{self.name} {name}: {choice(name, parameters(known[self.name]))}")
 
     @functools.cached_property
-    def bench(self) -> Bench:
-        """Build the interferometer."""
-        bench: Bench = call(kinds([Bench])[self.name], self.arguments)
+    def bench(self) -> Interferometer:
+        """The bench."""
+        bench: Interferometer = call(kinds([Interferometer])[self.name], self.arguments)
         return bench

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fringetrace.geometry import Mesh
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.scenefile.encode import Shelf, encode
 from fringetrace.scenefile.schema import Kind, Parameter, kinds, members, parameters
 from fringetrace.scenefile.toml import choice, dump
@@ -86,7 +86,7 @@ def template(name: str) -> str:
     ValueError
         If there is no such bench; says the nearest one.
     """
-    benches = kinds([Bench])
+    benches = kinds([Interferometer])
     if name == "free":
         return FREE
     if name not in benches:

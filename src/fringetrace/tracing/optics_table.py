@@ -186,7 +186,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         front=table[:, 0].copy(),
         back=table[:, 1].copy(),
         media=np.array([_index(medium, at) for medium in known]),
-        follow=np.array([_followed(surface) for surface in scene.surfaces], dtype=np.int8),
+        follow=np.array([followed_branches(surface) for surface in scene.surfaces], dtype=np.int8),
         film=_layers(scene, at),
         k0=0.0 if wavelength is None else 2.0 * math.pi / wavelength,
         wavelength=wavelength,
@@ -240,7 +240,8 @@ def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
     return table[0], table[1]
 
 
-def _followed(surface: Surface) -> int:
+def followed_branches(surface: Surface) -> int:
+    """Bits of the branches that are traced at a surface: reflected, transmitted, or opaque."""
     if isinstance(surface.interface, Metal):
         return REFLECTED | OPAQUE
     if isinstance(surface.interface, Dielectric):

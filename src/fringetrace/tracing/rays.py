@@ -8,7 +8,7 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, component, unit
+from fringetrace.core import Array, ComplexArray, FloatArray, component, filled, unit
 from fringetrace.scene import Beam, as_names
 
 # A field may point along its ray by as much: rounding.
@@ -17,7 +17,7 @@ TRANSVERSE = 1e-9
 
 def _rows_of_three(value: npt.ArrayLike, what: str) -> FloatArray:
     try:
-        rows = np.ascontiguousarray(value, dtype=np.float64)
+        rows = np.ascontiguousarray(filled(value))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what}: expected numbers of shape (n, 3), got {error}") from error
     if rows.ndim != 2 or rows.shape[1] != 3:
@@ -89,7 +89,7 @@ class Rays:
         """A unit field across each ray."""
         what = "Rays polarisation"
         try:
-            fields = np.broadcast_to(np.asarray(value, dtype=np.complex128), (len(self), 3))
+            fields = np.broadcast_to(filled(value, np.complex128), (len(self), 3))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{what}: expected numbers of shape ({len(self)}, 3), got {error}") from error
         size = np.linalg.norm(fields, axis=1, keepdims=True)
@@ -108,7 +108,7 @@ class Rays:
         if value is None:
             return np.full(len(self.origin), default, dtype=dtype)
         try:
-            column: Array = np.array(value, dtype=dtype)
+            column: Array = filled(value, dtype).copy()
         except (TypeError, ValueError) as error:
             raise ValueError(f"Rays {what}: expected numbers of shape (n,), got {error}") from error
         if column.shape != (len(self.origin),):

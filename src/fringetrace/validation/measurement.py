@@ -15,7 +15,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, FloatArray, tables
 from fringetrace.field import chosen
 from fringetrace.geometry import Mesh, interpolate_height, write_height_map
-from fringetrace.instruments import Bench, path_slope, records, step_axis, tiff
+from fringetrace.instruments import Interferometer, path_slope, records, step_axis, tiff
 from fringetrace.scene import pixel_centres
 from fringetrace.tracing import Ledger
 
@@ -139,12 +139,14 @@ def _piston(differences: FloatArray, wavelength: float) -> float:
     return middle + float(about[np.abs(about) <= 0.25 * wavelength].mean())
 
 
-def measure_height(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) -> Measurement:
-    """Measure a sample: record phase-stepped frames, compute the height, compare it with the mesh.
+def measure_height(
+    bench: Interferometer, truth: FloatArray, wavelength: float, steps: int = 4
+) -> Measurement:
+    """Record phase-stepped frames on a bench, find the height, and compare it with the truth.
 
     Parameters
     ----------
-    bench : Bench
+    bench : Interferometer
     truth : (rows, columns) float64, metres
         Heights at the pixels, see `heights`.
     wavelength : float, metres
@@ -163,7 +165,7 @@ def measure_height(bench: Bench, truth: FloatArray, wavelength: float, steps: in
     return Measurement(
         wavelength=wavelength,
         pitch=bench.ccd.pitch,
-        tilt=bench.tilt,
+        tilt=bench.arms.tilt,
         frames=bench.phase_steps(wavelength, steps),
         wrapped=bench.wrapped(wavelength, steps),
         height=height,

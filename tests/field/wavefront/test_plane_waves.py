@@ -34,7 +34,7 @@ def flux(paths):
 
 def test_triangles_of_one_plane_have_one_number():
     mesh = shapes.staircase(3 * mm, 2 * mm, 3, 70 * nm).moved((1e-3, 0, 2e-3), rotation((1, 2, 3), 0.7))
-    (planes,) = facet_groups.parted(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
+    (planes,) = facet_groups.group_facets(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
     assert (planes[::2] == planes[1::2]).all()
     assert len(np.unique(planes)) == 5
 
@@ -102,7 +102,7 @@ def test_parts_of_the_paths_bring_their_part_of_the_light():
         shapes.step(9 * mm, 9 * mm, 0.4 * mm, 80 * nm), aperture=3 * mm, pixels=(8, 9)
     )
     paths = bench.trace().detected
-    visits = paths.visits(bench.reference)
+    visits = paths.visits(bench.arms.reference.surface)
     parts = [ft.complex_field(paths.where(visits == n), HENE, "wavefront") for n in (0, 1)]
     assert abs(parts[1]) == pytest.approx(np.full((8, 9), 0.5), abs=1e-9)
     whole = ft.complex_field(paths, HENE, "wavefront")

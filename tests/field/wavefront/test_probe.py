@@ -73,14 +73,14 @@ def test_a_profile_is_that_of_the_place():
 
 def test_parts_are_kept_with_their_scene():
     scene = ft.Scene([ft.Surface(shapes.plate(2 * mm, 1 * mm), ft.Mirror())])
-    assert facet_groups.parted(scene) is facet_groups.parted(scene)
+    assert facet_groups.group_facets(scene) is facet_groups.group_facets(scene)
 
 
 def test_a_flat_form_is_a_facet():
     """A conic without curvature at its edge still is a form: below 0; plates are 0 or more."""
     plate = shapes.plate(4 * mm, 4 * mm)
     form = forms.Conic((0, 0, 0), (0, 0, 1), np.inf)
-    flat, formed = facet_groups.parted(
+    flat, formed = facet_groups.group_facets(
         ft.Scene([ft.Surface(plate, ft.Mirror(), "a"), ft.Surface(plate, ft.Mirror(), "b", form=form)])
     )
     assert (flat == 0).all()
@@ -96,6 +96,6 @@ def test_waves_beside_media_that_absorb_are_not_plane():
     gold = ft.Scene([ft.Surface(box, ft.Metal(), "gold", back="gold")])
     murk = ft.Scene([ft.Surface(box, ft.Mirror(), "mirror")], medium=1.3 + 1e-9j)
     for scene, plane in ((smoke, False), (clear, True), (gold, True), (murk, False)):
-        (parts,) = facet_groups.parted(scene)
+        (parts,) = facet_groups.group_facets(scene)
         assert len(np.unique(parts)) == 6
         assert (parts >= 0).all() if plane else (parts < 0).all()

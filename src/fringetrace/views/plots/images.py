@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, checked_wavelength, unit_of, whole
+from fringetrace.core import Array, FloatArray, checked_wavelength, filled, unit_of, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
@@ -62,7 +62,7 @@ def _image(
     values: Array, pitch: float, ax: Axes | None, *, label: str, title: str | None, style: dict[str, Any]
 ) -> Axes:
     """An array [row, column] = [y, x], with its axes, scale bar and colour bar."""
-    values = np.asarray(values)
+    values = filled(values)
     if values.ndim != 2 or values.size == 0:
         raise ValueError(f"image: expected shape (rows, columns), got {values.shape}")
     if not (np.isfinite(pitch) and pitch > 0.0):
@@ -141,6 +141,7 @@ def height(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str 
     -------
     matplotlib Axes
     """
+    map = filled(map)
     span = np.nanmax(np.abs(map)) if np.isfinite(map).any() else 0.0
     unit, metres = unit_of(float(span))
     return _image(map / metres, pitch, ax, label=f"height / {unit}", title=title, style={"cmap": "viridis"})
@@ -170,6 +171,7 @@ def residual(
     matplotlib Axes
         The scale ends at the 99.9th percentile, so that single pixels do not hide the rest.
     """
+    map = filled(map)
     valid = map[np.isfinite(map)]
     rms = float(np.sqrt(np.mean(valid**2))) if valid.size else 0.0
     top = float(np.quantile(np.abs(valid), 0.999)) if valid.size else 0.0

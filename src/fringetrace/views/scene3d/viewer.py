@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import FloatArray
-from fringetrace.instruments import Bench, Mark
+from fringetrace.instruments import Interferometer, Mark
 from fringetrace.scene import Scene
 from fringetrace.tracing import Paths
 from fringetrace.views.scene3d import formats, html
@@ -66,7 +66,7 @@ def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
 
 
 def scene_view(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several = None,
     *,
     colour: str = "route",
@@ -88,7 +88,7 @@ def scene_view(
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
         A bench brings its rays, its image (with a wavelength), and what a phase step turns.
     paths : Paths, or a sequence of them, optional
         Traced with record=True; of several beams. Those that reached the CCD are drawn; all, if none did.
@@ -133,9 +133,9 @@ def scene_view(
         If the paths have no recorded points, a name or a way of colouring is unknown, the image does not fit.
     """
     checked_colouring(colour, None)
-    if isinstance(scene, Bench):
+    if isinstance(scene, Interferometer):
         paths = scene.sampled(few(scene.beam.shape), wavelength) if paths is None else paths
-        reference = (scene.mark or Mark(scene.reference)) if reference is None else reference
+        reference = scene.arms.reference if reference is None else reference
         if image is None and wavelength is not None and sweep == 1:
             image = scene.interferogram(wavelength, step=step)
         scene = scene.scene
@@ -162,7 +162,7 @@ def _shift(explode: float | npt.ArrayLike, shown: Strands | None) -> FloatArray:
 
 
 def picture(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several | Callable[[], Several],
     path: str | os.PathLike[str],
     *,
@@ -173,7 +173,7 @@ def picture(
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`; or callable
         A function that gives them is called while VTK is loaded.
     path : path
@@ -192,7 +192,7 @@ def picture(
 
 
 def show(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several = None,
     *,
     size: tuple[int, int] = (1600, 1000),
@@ -202,7 +202,7 @@ def show(
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`
     size : (width, height), pixels
     **looks
@@ -219,7 +219,7 @@ def show(
 
 
 def page(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several,
     path: str | os.PathLike[str],
     *,
@@ -230,7 +230,7 @@ def page(
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`
     path : path
     title : str
@@ -248,13 +248,13 @@ def page(
 
 
 def export(
-    scene: Scene | Bench, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
+    scene: Scene | Interferometer, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
 ) -> None:
     """Export surfaces and rays as .glb, .ply or .vtp, in metres.
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`
     path : path
         Its suffix says the kind, see `exports.write_view`.
@@ -269,11 +269,11 @@ def export(
     formats.write_view(scene_view(scene, paths, **looks), path)
 
 
-def _interactive(scene: Scene | Bench, paths: Several, looks: Looks) -> View:
+def _interactive(scene: Scene | Interferometer, paths: Several, looks: Looks) -> View:
     """A view with phases at many wavelengths, and of a bench with an image for each phase step."""
     found = scene_view(scene, paths, sweep=SWEEP, **looks)
     frames, wavelength = None, looks.get("wavelength")
-    if isinstance(scene, Bench) and looks.get("image") is None and wavelength is not None:
+    if isinstance(scene, Interferometer) and looks.get("image") is None and wavelength is not None:
         frames = _binned(scene.phase_steps(wavelength, STEPS))
     panels = [
         panel if panel.name != "CCD" else replace(panel, image=_shown(panel.image, frames))
