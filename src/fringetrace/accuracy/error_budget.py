@@ -10,7 +10,7 @@ import numpy as np
 
 from fringetrace.core import Array, FloatArray, checked_wavelength
 from fringetrace.scene import Beam
-from fringetrace.tracing import Fate, Paths, at_wavelength, trace
+from fringetrace.tracing import Paths, at_wavelength, retrace
 
 # Rays along the longer side that are followed again, bounce by bounce; prime: not in step with facets.
 PROBES = 53
@@ -137,12 +137,7 @@ def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
         Followed for as many bounces as any path of `paths` that reached the CCD, and as faint.
     """
     assert isinstance(paths.source, Beam)
-    bounces = int(paths.bounces[paths.fate == Fate.DETECTED].max(initial=0))
-    beam = replace(paths.source, shape=shape)
-    return trace(
-        paths.scene, beam, paths.ccd, wavelength=paths.wavelength, max_bounces=bounces,
-        min_amplitude=paths.min_amplitude, record=record,
-    )  # fmt: skip
+    return retrace(paths, replace(paths.source, shape=shape), record=record)
 
 
 def _shape(paths: Paths) -> tuple[int, int]:
@@ -196,7 +191,7 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
 
     A facet that stands off by s makes a path longer by s (n' d' - n d) along its normal: 2 s cos(incidence)
     off a mirror. One that leans by e turns the ray by g e, 2 e off a mirror: after a way of L it lands
-    g e L beside its place, where the true wave, narrowed to a part m of its width, is behind or ahead
+    g e L beside its place, where the true wave, narrowing to a part m of its width, is behind or ahead
     by n' L (g e)^2 / 2 m.
 
     Parameters
@@ -213,23 +208,22 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
         The surface that costs most, and the largest error of a path by it, in waves.
     """
     from fringetrace.accuracy.path_errors import flattening
-    from fringetrace.tracing import indices, legs, leverage, met, shifted
+    from fringetrace.tracing import Segments, leverage, path_change, surface_hits
 
-    index = indices(paths)
-    length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
-    onward = np.cumsum(length[:, ::-1], axis=1)[:, ::-1]
+    segments = Segments.of(paths)
+    onward = np.cumsum(segments.length.astype(np.float64)[:, ::-1], axis=1)[:, ::-1]
     narrow = narrowing(paths)
     stood, leant = np.zeros(len(paths)), np.zeros(len(paths))
     worst: dict[str, float] = {}
-    for bounces in met(paths):
-        offset, lean = flattening(bounces)
-        off = np.asarray(shifted(paths, bounces, offset, direction), dtype=np.float64)
-        way = np.abs(onward[bounces.path, bounces.bounce + 1]) / narrow[bounces.path]
-        turned = leverage(bounces, direction, index) ** 2 * (lean**2).sum(axis=1)
-        turned *= 0.5 * index[bounces.path, bounces.bounce + 1]
-        beside = np.bincount(bounces.path, way * turned, len(paths))
+    for hits in surface_hits(paths):
+        offset, lean = flattening(hits)
+        off = np.asarray(path_change(segments, hits, offset), dtype=np.float64)
+        way = np.abs(onward[hits.path, hits.hit + 1]) / narrow[hits.path]
+        turned = leverage(segments, hits) ** 2 * (lean**2).sum(axis=1)
+        turned *= 0.5 * segments.index[hits.path, hits.hit + 1]
+        beside = np.bincount(hits.path, way * turned, len(paths))
         stood, leant = stood + off, leant + beside
-        worst[bounces.surface.name] = float(np.hypot(off, beside).max() / wavelength)
+        worst[hits.surface.name] = float(np.hypot(off, beside).max() / wavelength)
     costliest = max(worst.items(), key=lambda item: item[1], default=None)
     return _rms(np.hypot(stood, leant) / wavelength, np.abs(paths.amplitude) ** 2), costliest
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray
-from fringetrace.field import assemble, centred, complex_field
+from fringetrace.field import centred, complex_field, reconstruct
 from fringetrace.scene import CCD, Beam, pixels
 from fringetrace.tracing import Paths
 
@@ -33,25 +33,30 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
     return math.sqrt(off / all_) / (2.0 * math.pi) if all_ > 0.0 else 0.0
 
 
-def sample_bands(ccd: CCD, height: int = ROWS) -> list[CCD]:
-    """Bands of a CCD that represent all of it: rows near its lower end, its middle, its upper end.
+def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
+    """Rows of pixels that stand for all: some near the lower end, the middle, the upper end.
 
     Parameters
     ----------
-    ccd : CCD
+    shape : (rows, columns)
     height : int
-        Rows of each.
+        Rows of each band.
 
     Returns
     -------
-    list of CCD
-        The whole, if it has few rows.
+    list of (first row, row after the last)
+        All of them, if there are few.
     """
-    rows, columns = ccd.shape
+    rows = shape[0]
     if rows <= height * len(BANDS):
-        return [ccd]
+        return [(0, rows)]
     tops = [round(min(max(part * rows - 0.5 * height, 0.0), rows - height)) for part in BANDS]
-    return [_cut(ccd, top, height, columns) for top in tops]
+    return [(top, top + height) for top in tops]
+
+
+def _parts(ccd: CCD) -> list[CCD]:
+    """Parts of a CCD that stand for all of it, for the ray sum."""
+    return [_cut(ccd, top, stop - top, ccd.shape[1]) for top, stop in sample_bands(ccd.shape, MANY)]
 
 
 def _onto(paths: Paths, ccd: CCD) -> Paths:
@@ -87,11 +92,7 @@ def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0
     -------
     float, waves; see `budget.Budget`
     """
-    assert grids[0].ccd is not None
-    parts = sample_bands(grids[0].ccd)
-    fields = [
-        [complex_field(replace(paths, ccd=ccd), wavelength, "wavefront") for ccd in parts] for paths in grids
-    ]
+    fields = [_in_bands(paths, wavelength) for paths in grids]
     change = [_difference(fine, coarse) for fine, coarse in pairwise(fields)]
     if change[0] == 0.0:
         return 0.0
@@ -111,17 +112,13 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
     -------
     float, waves; see `budget.Budget`
     """
-    assert paths.ccd is not None
-    fields: list[ComplexArray] = []
-    finer: list[ComplexArray] = []
-    groups = np.zeros(len(paths), dtype=np.int64)
-    axes = (None,) if paths.field is None else paths.ccd.axes
-    for ccd in sample_bands(paths.ccd):
-        for axis in axes:
-            light = [assemble.light(replace(paths, ccd=ccd), groups, axis=axis)]
-            for images, more in ((fields, 0), (finer, MORE)):
-                images.append(assemble.fields(light, 1, ccd.shape, wavelength, True, more)[0])
-    return _difference(fields, finer)
+    return _difference(_in_bands(paths, wavelength), _in_bands(paths, wavelength, MORE))
+
+
+def _in_bands(paths: Paths, wavelength: float, more: int = 0) -> list[ComplexArray]:
+    """The mean field of pixels that stand for all, by wavefronts; with more points in each."""
+    found = reconstruct(paths, wavelength)
+    return [found.refined(wavelength, rows, more) for rows in sample_bands(found.ccd.shape)]
 
 
 def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
@@ -162,7 +159,7 @@ def offset_error(paths: Paths, wavelength: float) -> float:
     """
     assert paths.ccd is not None
     seen = paths.detected
-    parts = [_onto(seen, ccd) for ccd in sample_bands(paths.ccd, MANY)]
+    parts = [_onto(seen, ccd) for ccd in _parts(paths.ccd)]
     means = [complex_field(spread_over_pixels(part, wavelength), wavelength, "rays") for part in parts]
     return _difference(means, [complex_field(part, wavelength, "rays") for part in parts])
 
@@ -186,7 +183,7 @@ def count_error(paths: Paths, wavelength: float) -> float:
     assert paths.ccd is not None
     assert isinstance(paths.source, Beam)
     seen, fields, others = paths.detected, [], []
-    for ccd in sample_bands(paths.ccd, MANY):
+    for ccd in _parts(paths.ccd):
         rows, columns = (n - n % 2 for n in ccd.shape)
         if rows == 0 or columns == 0:
             return 0.0

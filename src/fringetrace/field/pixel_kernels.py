@@ -11,15 +11,22 @@ from fringetrace.core import grown, jit, part
 
 
 @jit
-def average(first, weight, field, mean, mutual):
-    """Weighted means over each pixel of the fields and of E_m conj(E_n)."""
-    groups = len(field)
-    for pixel in range(len(first) - 1):
-        for m in range(groups):
+def means(first, weight, field, mean):
+    """Weighted means over the samples of each pixel of the fields."""
+    for m in range(len(field)):
+        for pixel in range(len(first) - 1):
             total = 0.0j
             for k in range(first[pixel], first[pixel + 1]):
                 total += weight[k] * field[m, k]
             mean[m, pixel] = total
+
+
+@jit
+def products(first, weight, field, mutual):
+    """Weighted means over the samples of each pixel of E_m conj(E_n)."""
+    groups = len(field)
+    for pixel in range(len(first) - 1):
+        for m in range(groups):
             for n in range(m, groups):
                 real, imaginary = 0.0, 0.0
                 for k in range(first[pixel], first[pixel + 1]):

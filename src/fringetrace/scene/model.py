@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy.typing as npt
 
@@ -72,6 +72,11 @@ class Surface:
     def boundary(self) -> bool:
         """Whether the surface separates two media."""
         return isinstance(self.interface, (Dielectric, Metal))
+
+    @property
+    def element(self) -> Element | None:
+        """The thin element that it is, if it is one."""
+        return cast("Element", self.interface) if hasattr(self.interface, "act") else None
 
     def _check_media(self) -> None:
         for side in ("front", "back"):

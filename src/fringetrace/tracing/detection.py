@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, frame
+from fringetrace.core import Array, ComplexArray, FloatArray, frame
 from fringetrace.scene import CCD
 from fringetrace.tracing.fates import Fate
 from fringetrace.tracing.paths import Paths
@@ -44,21 +44,22 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
     return rows, point, paths.length[rows] + reach[rows] * index
 
 
-def along(paths: Paths, axis: FloatArray) -> Paths:
-    """Paths with the field component along an axis as their amplitude.
+def components(paths: Paths, ccd: CCD) -> ComplexArray:
+    """Field that each path brings to a CCD.
 
     Parameters
     ----------
     paths : Paths
-        Of light with a polarisation.
-    axis : (3,) float64, unit
+    ccd : CCD
 
     Returns
     -------
-    Paths
+    (1, m) complex128
+        The amplitude; of polarised light (3, m), its components along the CCD's columns, rows and normal.
     """
-    assert paths.field is not None
-    return replace(paths, amplitude=paths.field @ axis)
+    if paths.field is None:
+        return paths.amplitude[None]
+    return np.stack([paths.field @ axis for axis in ccd.axes])
 
 
 def project(paths: Paths, ccd: CCD) -> Paths:

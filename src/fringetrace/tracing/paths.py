@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -80,8 +81,17 @@ class Paths:
         Surface and its triangle at each bounce, padded with -1.
     points : (m, b + 2, 3) float64, metres, or None unless recorded
         Start, hits, and the end on the CCD, padded with NaN.
+    branch : (m, b) int8, or None unless recorded
+        Branch taken at each hit: 0 reflected (or absorbed), 1 transmitted, 2 and more the further ones of
+        an element, whose first is 1; padded with -1.
+    media : (m, b + 1) int32, or None unless recorded among media
+        Number of the medium on each segment, padded with -1.
+    indices : (m, b + 1) float64, or None unless recorded among media
+        Real refractive index for the ray on each segment, |Re k| / k0; padded with NaN.
     departures : (m, b + 1, 3) float64, metres, or None unless recorded among thin elements
         Where light went on from the start and each hit: beside it, where an element displaced it.
+    advances : (m, b) float64, metres, or None unless recorded among thin elements
+        Optical path that an element added at each hit; padded with 0.
     wavelength : float or None, metres
         That of the trace, where the scene has media; None: any.
     medium : (m,) int32
@@ -125,7 +135,11 @@ class Paths:
     surface: npt.NDArray[np.int64] | None = None
     triangle: npt.NDArray[np.int64] | None = None
     points: FloatArray | None = None
+    branch: npt.NDArray[np.int8] | None = None
+    media: npt.NDArray[np.int32] | None = None
+    indices: FloatArray | None = None
     departures: FloatArray | None = None
+    advances: FloatArray | None = None
     wavelength: float | None = None
     medium: npt.NDArray[np.int32] | None = None
     index: FloatArray | None = None
@@ -135,6 +149,8 @@ class Paths:
     bend: FloatArray | None = None
     contradictions: npt.NDArray[np.int64] | None = None
     min_amplitude: float = 1e-6
+    # what is worked out from the paths once, such as their wavefronts
+    derived: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.ray)
@@ -155,7 +171,7 @@ class Paths:
         return replace(self, **chosen)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {"derived": {}}
 
     @cached_property
     def detected(self) -> Paths:
@@ -330,14 +346,18 @@ class Paths:
 
 COLUMNS = (
     "ray", "fate", "bounces", "reflections", "length", "origin", "direction", "amplitude", "lost", "key",
-    "surface", "triangle", "points", "departures", "medium", "index", "lengths", "field", "dropped", "bend",
+    "surface", "triangle", "points", "branch", "media", "indices", "departures", "advances",
+    "medium", "index", "lengths", "field", "dropped", "bend",
 )  # fmt: skip
-RECORDED = ("surface", "triangle", "points", "departures")
+# Columns with an entry for each hit, and what stands where there is none.
+RECORDED = {
+    "surface": -1, "triangle": -1, "points": np.nan, "branch": -1, "media": -1, "indices": np.nan,
+    "departures": np.nan, "advances": 0.0,
+}  # fmt: skip
 
 
-def _padded(columns: Sequence[Array], width: int) -> Array:
+def _padded(columns: Sequence[Array], width: int, fill: float) -> Array:
     """Arrays of different widths, one below the other."""
-    fill = np.nan if columns[0].dtype.kind == "f" else -1
     total = sum(len(column) for column in columns)
     table = np.full((total, width, *columns[0].shape[2:]), fill, dtype=columns[0].dtype)
     row = 0
@@ -385,7 +405,7 @@ def join(parts: Iterable[Paths]) -> Paths:
                 f"join: expected parts of one trace, got {name} in {known} of {len(arrays)} of them"
             )
         if name in RECORDED:
-            columns[name] = _padded(arrays, max(array.shape[1] for array in arrays))
+            columns[name] = _padded(arrays, max(array.shape[1] for array in arrays), RECORDED[name])
         else:
             columns[name] = np.concatenate(arrays)
     first = parts[0]

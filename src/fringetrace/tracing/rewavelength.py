@@ -76,6 +76,7 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
         amplitude=paths.amplitude * (factor if paths.field is None else np.abs(factor)),
         field=None if paths.field is None else paths.field * factor[:, None],
         index=None if paths.medium is None else new.real[paths.medium],
+        indices=None if paths.media is None else np.where(paths.media < 0, np.nan, new.real[paths.media]),
         wavelength=wavelength,
     )
 

@@ -42,7 +42,7 @@ class PatchFit:
     pieces : Pieces
     owner : (n,) int64
         The patch of each piece.
-    coefficients : (m, 6, 4, 4) float64
+    coefficients : (m, 4 + 2 components, 4, 4) float64
         See `raster`; s and t run from 0 to 1 over the patch.
     turns : (m, 2) int64
         Caustics passed where J < 0 and where J > 0.
@@ -211,7 +211,7 @@ def fitted(
     ray : (m,) int64
         Which of them arrived, counted through.
     arrived : Arrivals
-    amplitude : (m,) complex128
+    amplitude : (m, components) complex128
     base : float, metres
         Paths are fitted less this.
     shape : (rows, columns)
@@ -219,7 +219,7 @@ def fitted(
 
     Returns
     -------
-    coefficients : (n, 6, 4, 4) float64
+    coefficients : (n, 4 + 2 components, 4, 4) float64
         See `raster`.
     turns : (n, 2) int64
         Caustics passed where J < 0 and where J > 0.
@@ -237,7 +237,8 @@ def fitted(
     row: Array = number.reshape(count, RAYS)
     row = np.where(known, row, row[np.arange(count), np.argmax(known, axis=1)][:, None])
     good &= _near(arrived.x[row], shape[1]) & _near(arrived.y[row], shape[0]) if len(ray) else False
-    coefficients, turns = np.zeros((count, 6, 4, 4)), np.zeros((count, 2), dtype=np.int64)
+    coefficients = np.zeros((count, 4 + 2 * amplitude.shape[1], 4, 4))
+    turns = np.zeros((count, 2), dtype=np.int64)
     off = np.zeros(count)
     chosen = np.flatnonzero(good)
     for some in np.split(chosen, range(CHUNK, len(chosen), CHUNK)):
@@ -274,14 +275,14 @@ def _patches(
     x, y, w = arrived.x[row], arrived.y[row], arrived.length[row] - base
     steps = slopes(np.stack([x, y], axis=-1))
     area = np.linalg.det(steps)
-    light = amplitude[row] * root[:, None]
-    values = np.stack([x, y, w, area, light.real, light.imag], axis=-1) * known[..., None]
+    light = np.ascontiguousarray(amplitude[row] * root[:, None, None]).view(np.float64)
+    values = np.concatenate([np.stack([x, y, w, area], axis=-1), light], axis=-1) * known[..., None]
     cubic = (s[..., :4, None] * t[..., None, :4]).reshape(*s.shape[:2], 16)
     cubic *= known[..., None]
     found = np.linalg.pinv(cubic, rcond=RANK) @ values
     left = (cubic @ found - values)[..., :2]
     off = np.sqrt((left**2).sum(axis=(1, 2)) / known.sum(axis=1))
-    found = np.swapaxes(found, 1, 2).reshape(-1, 6, 4, 4)
+    found = np.swapaxes(found, 1, 2).reshape(len(x), -1, 4, 4)
     turns = np.zeros((len(x), 2), dtype=np.int64)
     if arrived.way is not None:
         passed = caustics(arrived.way[row], arrived.direction[row], arrived.last[row], slopes)

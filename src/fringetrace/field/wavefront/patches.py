@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -11,8 +12,10 @@ import numpy.typing as npt
 from fringetrace.core import Array, ComplexArray, FloatArray, frame
 from fringetrace.field.wavefront.ray_tubes import along_grid, caustics, differences
 from fringetrace.scene import CCD, Beam
-from fringetrace.tracing import Paths, landed
+from fringetrace.tracing import Paths, components, landed
 
+# Of the fields of a cell (x, y, path, J) the amplitudes come last: two for each component.
+AMPLITUDE = 4
 # From values and slopes at both ends to the coefficients of a cubic.
 HERMITE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
 
@@ -30,7 +33,8 @@ class Sheet:
     length : (rows, columns) float64, metres
         Optical path, less `base`.
     base : float, metres
-    amplitude : (rows, columns) complex128
+    amplitude : (rows, columns, components) complex128
+        See `components`.
     turns : (rows, columns) int64
         Caustics passed (the KMAH index).
     """
@@ -47,7 +51,7 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class PatchCells:
-    """Cells of a wavefront in the form that the kernels read; for `place` see `leaved`."""
+    """A sheet's cells as the kernels read them, see `raster_kernels`; for `place` see `leaved`."""
 
     coefficients: FloatArray
     leaves: FloatArray
@@ -55,6 +59,28 @@ class PatchCells:
     turns: npt.NDArray[np.int64]
     base: float
     place: npt.NDArray[np.int64]
+
+    def component(self, number: int) -> FloatArray:
+        """Coefficients (n, 6, 4, 4) with one component of the amplitude."""
+        if self.coefficients.shape[1] == AMPLITUDE + 2:
+            return self.coefficients
+        chosen = [*range(AMPLITUDE), AMPLITUDE + 2 * number, AMPLITUDE + 2 * number + 1]
+        return np.ascontiguousarray(self.coefficients[:, chosen])
+
+    @cached_property
+    def crossed(self) -> npt.NDArray[np.bool_]:
+        """Which squares of the beam's grid (n,) a fold crosses: J changes its sign at their corners."""
+        corner = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]])
+        corners = np.einsum("si,nij,tj->nst", corner, self.coefficients[:, 3], corner)
+        signs = (corners.min(axis=(1, 2)) <= 0.0) & (corners.max(axis=(1, 2)) >= 0.0)
+        return np.asarray(signs & (self.place >= 0).all(axis=1))
+
+    @cached_property
+    def folds(self) -> bool:
+        """Whether there are folds: then the field depends on the wavelength by more than the phase."""
+        from fringetrace.field.wavefront.raster_kernels import SIGN
+
+        return bool(self.crossed.any() or (self.leaves[:, SIGN] == 0.0).any())
 
 
 def sheets(paths: Paths) -> Iterator[Sheet]:
@@ -98,6 +124,7 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
     -------
     Sheet
     """
+    chosen = paths.where(rows)
     arrived = arrivals(paths, rows, ccd)
 
     def grid(values: Array) -> Array:
@@ -113,7 +140,7 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
         turns = caustics(way, direction, last, along_grid)
     return Sheet(
         x=grid(arrived.x), y=grid(arrived.y), slope_x=grid(arrived.slope_x), slope_y=grid(arrived.slope_y),
-        length=grid(arrived.length - base), base=base, amplitude=grid(paths.amplitude[rows]), turns=turns,
+        length=grid(arrived.length - base), base=base, amplitude=grid(components(chosen, ccd).T), turns=turns,
     )  # fmt: skip
 
 
@@ -227,7 +254,7 @@ def patches(sheet: Sheet) -> tuple[FloatArray, FloatArray]:
 
     Returns
     -------
-    coefficients : (rows - 1, columns - 1, 6, 4, 4) float64
+    coefficients : (rows - 1, columns - 1, 4 + 2 components, 4, 4) float64
         See `raster`; NaN where a corner is missing.
     area : (rows, columns) float64
         The map's Jacobian at the nodes.
@@ -242,9 +269,9 @@ def patches(sheet: Sheet) -> tuple[FloatArray, FloatArray]:
         _bicubic(sheet.y, y_s, y_t, differences(y_s, 0)),
         _bicubic(sheet.length, w_s, w_t, 0.5 * (differences(w_s, 0) + differences(w_t, 1))),
         _interpolated(area),
-        _interpolated(sheet.amplitude.real),
-        _interpolated(sheet.amplitude.imag),
     ]
+    for component in np.moveaxis(sheet.amplitude, -1, 0):
+        fields += [_interpolated(component.real), _interpolated(component.imag)]
     return np.stack(fields, axis=2), area
 
 
@@ -258,11 +285,11 @@ def leaved(
     lines: FloatArray,
     ccd: CCD,
 ) -> PatchCells:
-    """Cells with their quadtree leaves.
+    """PatchCells and their leaves.
 
     Parameters
     ----------
-    coefficients : (n, 6, 4, 4) float64
+    coefficients : (n, 4 + 2 components, 4, 4) float64
     turns : (n, 2) int64
     base : float, metres
     place : (n, 2) int64
@@ -277,7 +304,7 @@ def leaved(
 
     Returns
     -------
-    Cells
+    PatchCells
     """
     from fringetrace.field.wavefront import raster_kernels
 
@@ -306,7 +333,7 @@ def cells(sheet: Sheet, ccd: CCD) -> PatchCells:
 
     Returns
     -------
-    Cells
+    PatchCells
     """
     coefficients, area = patches(sheet)
     whole = np.isfinite(coefficients).all(axis=(2, 3, 4))

@@ -173,14 +173,17 @@ def gradient(cells, cell, s, t):
 
 
 @jit
-def add_leaves(leaves, cells, folded, turns, unit, period, top, columns, first, x, y, field, slope):
-    """Add the waves of regular leaves to the sample points of a band of pixels from row `top` on.
+def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y, slope):
+    """What regular leaves bring to the sample points of a band of pixels that begins at row `top`.
 
-    `folded` marks cells in which J changes its sign, `turns` has their caustics passed where J < 0
-    and where J > 0, `unit` is the beam area of a cell in pixels. `slope` (lowest and highest of both
-    gradients of the path, metres a pixel) is widened to what each sample has seen.
+    A row for each: the number of the point, the optical path, real and imaginary part of each component
+    of the amplitude. `folded` marks cells in which J changes its sign, `turns` has their caustics passed
+    where J < 0 and where J > 0, `unit` is the beam area of a cell in pixels. `slope` (lowest and highest
+    of both gradients of the path, metres a pixel) is widened to what each point has seen.
     """
-    rows = (len(first) - 1) // columns
+    rows, components = (len(first) - 1) // columns, (cells.shape[1] - 4) // 2
+    found = np.empty((len(x) + 16, 2 + 2 * components))
+    count = 0
     for row in range(len(leaves)):
         leaf = leaves[row]
         cell = int(leaf[CELL])
@@ -197,15 +200,40 @@ def add_leaves(leaves, cells, folded, turns, unit, period, top, columns, first, 
             for j in range(begin, end + 1):
                 pixel = (i - top) * columns + j
                 for k in range(first[pixel], first[pixel + 1]):
-                    found, a, b, area = root(cells, cell, s0, s1, t0, t1, sign, s, t, x[k], y[k])
-                    if not found or leaf[A] * a + leaf[B] * b < leaf[C]:
+                    there, a, b, area = root(cells, cell, s0, s1, t0, t1, sign, s, t, x[k], y[k])
+                    if not there or leaf[A] * a + leaf[B] * b < leaf[C]:
                         continue
                     s, t = a, b  # the next sample is near
-                    spreading = area if bent else scalar(cells, cell, 3, a, b)
-                    field[k] += phase * plain(cells, cell, a, b, spreading, unit, period)
+                    size = np.sqrt(unit / abs(area if bent else scalar(cells, cell, 3, a, b))) * phase
+                    if count == len(found):
+                        found = grown(found)
+                    found[count, 0], found[count, 1] = k, scalar(cells, cell, 2, a, b)
+                    for c in range(2, 2 + 2 * components, 2):
+                        real, imaginary = (
+                            scalar(cells, cell, c + 2, a, b),
+                            scalar(cells, cell, c + 3, a, b),
+                        )
+                        light = size * complex(real, imaginary)
+                        found[count, c], found[count, c + 1] = light.real, light.imag
+                    count += 1
                     if len(slope) > 0:
                         across, up = gradient(cells, cell, a, b)
                         widen(slope[k], across, up)
+    return found[:count]
+
+
+@jit
+def add_waves(rows, begin, component, period, group, factor, field):
+    """Add waves at a wavelength to the fields of their groups; `rows` as `leaf_contributions` has them.
+
+    Those of wave w are rows begin[w] to begin[w + 1]; they are multiplied by factor[w].
+    """
+    c = 2 + 2 * component
+    for wave in range(len(begin) - 1):
+        light, there = factor[wave], field[group[wave]]
+        for row in rows[begin[wave] : begin[wave + 1]]:
+            turn = 2.0 * np.pi * ((row[1] % period) / period)
+            there[int(row[0])] += light * complex(row[c], row[c + 1]) * complex(np.cos(turn), np.sin(turn))
 
 
 @part
@@ -216,18 +244,25 @@ def widen(slope, across, up):
 
 
 @jit
-def spread_flat(
-    inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, period, first,
-    x, y, where_x, where_y, shape, field, slope, pixels,
+def plane_wave_contributions(
+    inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, first,
+    x, y, where_x, where_y, shape, slope, pixels,
 ):  # fmt: skip
-    """Add a plane wave to the sample points that its region of the beam reaches.
+    """What a plane wave brings to the sample points that its region of the beam reaches.
 
     (s, t) = inverse (point - origin); the path at the origin is `path`, its gradient `gradient`.
     `kind` of each cell from (low_s, low_t) on: 0 dark, 1 lit, 2 in pieces, those of the cell from
     begin[cell] on. A piece is s, t from, s, t to, and a, b, c: lit where a s + b t > c. A point belongs
     to the region if (where_x, where_y) does. `pixels` of the band: first and last row, column.
+    `amplitude` is (points or 1, components). Rows are as those of `leaf_contributions`.
     """
     rows, columns = kind.shape
+    components = amplitude.shape[1]
+    most = 0
+    for i in range(pixels[0], pixels[1]):
+        most += first[i * shape + pixels[3]] - first[i * shape + pixels[2]]
+    found = np.empty((most, 2 + 2 * components))
+    count = 0
     for i in range(pixels[0], pixels[1]):
         for pixel in range(i * shape + pixels[2], i * shape + pixels[3]):
             for k in range(first[pixel], first[pixel + 1]):
@@ -249,9 +284,11 @@ def spread_flat(
                     if not lit:
                         continue
                 dx, dy = x[k] - origin[0], y[k] - origin[1]
-                way = path + gradient[0] * dx + gradient[1] * dy
-                turn = 2.0 * np.pi * ((way % period) / period)
-                size = amplitude[k] if len(amplitude) > 1 else amplitude[0]
-                field[k] += size * complex(np.cos(turn), np.sin(turn))
+                found[count, 0], found[count, 1] = k, path + gradient[0] * dx + gradient[1] * dy
+                light = amplitude[k] if len(amplitude) > 1 else amplitude[0]
+                for c in range(components):
+                    found[count, 2 + 2 * c], found[count, 3 + 2 * c] = light[c].real, light[c].imag
+                count += 1
                 if len(slope) > 0:
                     widen(slope[k], gradient[0], gradient[1])
+    return found[:count]

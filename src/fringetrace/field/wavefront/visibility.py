@@ -145,8 +145,8 @@ def _cell(at: FloatArray, shape: tuple[int, int]) -> npt.NDArray[np.int64]:
     return np.clip(np.floor(at[:, ::-1]), 0, np.array(shape) - 1).astype(np.int64).T
 
 
-def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = None) -> Survey:
-    """Trace from the nodes of a beam's grid, and from points where features may hide between them.
+def survey(paths: Paths) -> Survey:
+    """Trace anew from the nodes of a beam's grid, and where features may hide between them.
 
     Rays are sent to either side of the edges of meshes: rims, edges between facets, and silhouettes;
     and from the centres of cells where `paths` met other surfaces than the rays from all four corners.
@@ -161,10 +161,6 @@ def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = 
     ----------
     paths : Paths
         Of a `Beam` onto a CCD; sequences of surfaces that are missing here are left out.
-    half_wave_loss : bool
-        False leaves out the factor -1 of each reflection off a mirror.
-    axis : (3,) float64, optional
-        Of light with a polarisation, the amplitude is the field along it.
 
     Returns
     -------
@@ -175,7 +171,7 @@ def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = 
     ValueError
         If the source is no beam, or there is no CCD.
     """
-    probe = _probe(paths, half_wave_loss, axis)
+    probe = _probe(paths)
     shape = probe.beam.shape[0] + 1, probe.beam.shape[1] + 1
     row, column = np.indices(shape)
     nodes = np.stack([column.ravel(), row.ravel()], axis=1).astype(np.float64)
@@ -206,16 +202,13 @@ def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = 
     )  # fmt: skip
 
 
-def _probe(paths: Paths, half_wave_loss: bool, axis: FloatArray | None) -> Probe:
+def _probe(paths: Paths) -> Probe:
     """A probe for what paths of a beam took."""
     ccd, beam = checked(paths)
     rows, _, _ = landed(paths, ccd)
     keys, bounces = np.unique(paths.key[rows]), int(paths.bounces[rows].max(initial=0))
     faintest = 0.5 * float(np.abs(paths.amplitude[rows]).min(initial=1.0))
-    return Probe(
-        paths.scene, beam, ccd, group_facets(paths.scene), keys, bounces, faintest, half_wave_loss,
-        paths.wavelength, axis,
-    )  # fmt: skip
+    return Probe(paths, beam, ccd, group_facets(paths.scene), keys, bounces, faintest)
 
 
 def _differing(paths: Paths, ccd: CCD, node: Array, keys: Names, shape: tuple[int, int]) -> FloatArray:
