@@ -473,14 +473,14 @@ def measured(case: Skip, rounds: int = ROUNDS) -> tuple[float, float, str]:
     return on, off, alike
 
 
-SECTION = """## What each skip saves
+SECTION = """## Savings of each skip
 
-The same work with a rule that leaves something out and without it, one thread, made by
-`benchmarks/skips.py --write`: medians of {rounds} runs in turn, {rays} rays.
+Each row compares the same work with and without one skip, on one thread: medians of {rounds} alternating
+runs, {rays} rays, made by `benchmarks/skips.py --write`.
 
-Visibility rays are never shot: shadows are found where sheets end, by rays of the beam itself. Of a
-BRDF that is reciprocal `reciprocal=True` sums half of the table (ray sums are so only as far as their rays
-sample it: no row here).
+Visibility rays are never traced: rays of the beam itself locate shadows where wavefronts end. For a
+reciprocal BRDF, `reciprocal=True` sums half of the table (ray sums are reciprocal only as far as their rays
+sample the sample: no row here).
 
 """
 

@@ -23,9 +23,8 @@ FOCAL, HEIGHT, SIDE, PIXELS = 50 * mm, 20 * mm, 2 * mm, 1024
 
 SECTION = """## A million pixels
 
-A paraboloid seen 30 mm before its focus on 1024 x 1024 pixels, made by
-`benchmarks/wavefront.py --write`. The ray sum has one ray a pixel, and squares how light is concentrated,
-see above.
+A paraboloid is seen 30 mm before its focus on 1024 x 1024 pixels (`benchmarks/wavefront.py --write`). The
+ray sum has one ray per pixel, and squares the concentration of light, see above.
 
 """
 
