@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fringetrace.core import FloatArray
 
-if TYPE_CHECKING:
-    pass
-
-
-Axes = tuple[FloatArray, FloatArray, FloatArray]
+PlaneAxes = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def checked_positive(value: float, what: str) -> float:
