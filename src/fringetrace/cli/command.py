@@ -1,4 +1,4 @@
-"""The command: a mesh or scene file to interferogram, frames, height map, one labelled file, pictures."""
+"""Command line: mesh or scene file to interferogram, frames, height map, data file and pictures."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ FAILURE, INTERRUPTED = 2, 130
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Settings:
-    """What both commands take.
+    """Options that `interferogram` and `demo` share.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def demo(
     out: Path = Path("fringetrace-demo"),
     settings: Settings = Settings(),
 ) -> None:
-    """The whole way on matplotlib's sample elevation map, scaled down to a few wavelengths.
+    """Demonstrate the whole chain on matplotlib's elevation sample, scaled to a few wavelengths.
 
     Every second sample of the map (Jacksboro fault, Tennessee; 840 m of relief over 30 km) becomes
     a mirror of 8 mm with 2 um of relief, measured and written as by `fringetrace interferogram`.
@@ -155,7 +155,7 @@ def bench(
     quick: bool = False,
     scenes: tuple[str, ...] = (),
 ) -> None:
-    """Run time against error on this machine: methods on scenes whose field is known in closed form.
+    """Benchmark run time against error on this machine, on scenes with closed-form fields.
 
     The ray sum and the wavefront method, with facets and with the exact surface behind them, and a
     tracer in float32 throughout, each with more and more rays: two minutes, or twenty seconds if
@@ -364,7 +364,7 @@ def _length(metres: float) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
+    """Run the command line.
 
     Parameters
     ----------

@@ -40,7 +40,7 @@ class Mark:
     sense: int = 1
 
     def count(self, paths: Paths) -> npt.NDArray[np.int64]:
-        """How often each path did.
+        """Number of times each path met the marked surface.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Mark:
 
 
 def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:
-    """Rise of the optical path of a beam off a tilted plane mirror, on a plane across the beam.
+    """Slope of the optical path of a beam off a tilted plane mirror, on a plane across the beam.
 
     A mirror tilted by a turns the beam by 2a; the plane wave's path then rises by sin 2a a
     metre in the direction of the tilt.

@@ -1,4 +1,4 @@
-"""The Fizeau interferometer: light goes to and fro between a reference face and the sample."""
+"""Fizeau interferometer: multiple round trips between a reference face and the sample."""
 
 from __future__ import annotations
 

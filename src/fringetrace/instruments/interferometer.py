@@ -286,7 +286,7 @@ class Interferometer:
         return total
 
     def field(self, wavelength: float, step: float = 0.0) -> ComplexArray:
-        """Field on the CCD.
+        """Complex field on the CCD.
 
         Parameters
         ----------
@@ -303,7 +303,7 @@ class Interferometer:
         return np.asarray(np.tensordot(turns, fields, axes=1), dtype=np.complex128)
 
     def interferogram(self, light: Light, *, modulus: bool = False, step: float = 0.0) -> FloatArray:
-        """What the CCD records.
+        """Interferogram: irradiance on the CCD.
 
         Parameters
         ----------
@@ -418,7 +418,7 @@ class Interferometer:
         return np.asarray(path / (-2.0 * self.arms.index(wavelength)), dtype=np.float64)
 
     def budget(self, wavelength: float) -> Budget:
-        """What rounding, facets, rays and pixels cost the image, in waves.
+        """Error budget of the image, in waves: rounding, facets, sampling, pixels.
 
         Parameters
         ----------
@@ -439,7 +439,7 @@ class Interferometer:
         return costs
 
     def dataset(self, wavelength: float, steps: int = 4) -> Dataset:
-        """Everything that is recorded at a wavelength, labelled: for xarray, plots, and NetCDF files.
+        """Labelled dataset of all that is recorded at a wavelength, for xarray and NetCDF.
 
         Parameters
         ----------

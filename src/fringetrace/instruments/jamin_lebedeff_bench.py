@@ -1,4 +1,4 @@
-"""The Jamin-Lebedeff interferometer: crystal plates part the light into two beams, and join them again."""
+"""Jamin-Lebedeff interferometer: birefringent plates separate two beams and recombine them."""
 
 from __future__ import annotations
 

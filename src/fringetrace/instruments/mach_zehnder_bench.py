@@ -1,4 +1,4 @@
-"""The Mach-Zehnder interferometer: one arm goes through the sample, once."""
+"""Mach-Zehnder interferometer: one arm passes the sample once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ready benches: the Michelson, and the others by name."""
+"""Michelson (Twyman-Green) interferometer."""
 
 from __future__ import annotations
 

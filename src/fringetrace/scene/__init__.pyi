@@ -1,3 +1,4 @@
+from .coplanar import planes as planes
 from .facet_groups import group_facets as group_facets
 from .model import Scene as Scene, Surface as Surface
 from .sensor import (

@@ -8,13 +8,21 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace.core import ROUNDED, ComplexArray, FloatArray, checked_direction, checked_vector, frame
+from fringetrace.core import (
+    ROUNDED,
+    ComplexArray,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    filled,
+    frame,
+)
 from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive, checked_size
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Gaussian beam profile, brightest at the centre: amplitude exp(-r^2 / waist^2).
+    """Gaussian beam profile: amplitude exp(-r^2 / waist^2).
 
     Parameters
     ----------
@@ -41,7 +49,7 @@ Profile = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Names of surfaces, given as one or as several.
+    """Tuple of surface names, from one name or several.
 
     Parameters
     ----------
@@ -56,7 +64,7 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
 
 def _checked_jones(value: Any) -> ComplexArray:
     try:
-        vector = np.array(value, dtype=np.complex128)
+        vector: ComplexArray = filled(value, np.complex128).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
     size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
@@ -67,7 +75,7 @@ def _checked_jones(value: Any) -> ComplexArray:
 
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """A collimated coherent beam: a plane wave, launched as a grid of parallel rays.
+    """Collimated coherent beam: a plane wave, launched as a grid of parallel rays.
 
     Parameters
     ----------
@@ -120,5 +128,5 @@ class Beam:
 
     @property
     def area(self) -> float:
-        """Area of the beam that one ray stands for, m^2."""
+        """Beam area per ray, m^2."""
         return self.size[0] * self.size[1] / (self.shape[0] * self.shape[1])

@@ -1,4 +1,4 @@
-"""Values of a TOML file become what they stand for, by the types of parameters."""
+"""Decoding of TOML values into objects, by the types of parameters."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ CALLABLE = get_origin(Callable[[], None])
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """How a thing is turned about the origin, and then shifted.
+    """Pose: rotation about the origin, then a shift.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ class Pose:
 
     @property
     def matrix(self) -> FloatArray | None:
-        """(3, 3) float64, or None."""
+        """Rotation matrix, (3, 3) float64, or None."""
         return self.turn if self.axis is None else rotation(self.axis, self.angle)
 
 
 def decode(value: Any, hint: Any, place: Place, unit: Unit = "") -> Any:
-    """What a TOML value stands for.
+    """Object that a TOML value stands for.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a scene file may name: the kinds of things, and their parameters with type and unit.
+"""Schema of scene files: kinds of objects, and their parameters with type and unit.
 
 All of it is read off dataclasses and signatures, units off the docstrings: a new kind needs no word here.
 """
@@ -70,7 +70,7 @@ class Parameter:
 
     @property
     def required(self) -> bool:
-        """Whether it has to be given."""
+        """Whether the parameter has no default."""
         return self.default is inspect.Parameter.empty and not self.several
 
 
@@ -97,7 +97,7 @@ def _unit(slot: str) -> Unit:
 
 @functools.cache
 def parameters(kind: Kind) -> dict[str, Parameter]:
-    """The parameters of a dataclass or a function.
+    """Parameters of a dataclass or a function.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def parameters(kind: Kind) -> dict[str, Parameter]:
 
 
 def members(hint: Any) -> tuple[Any, ...]:
-    """The alternatives of a type, without None; what numpy takes for an array is one of them.
+    """Alternatives of a union type, without None; numpy's array-likes count as one.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _protocol(member: Any) -> bool:
 
 
 def concrete(some: Sequence[Any]) -> list[type]:
-    """Those alternatives that are dataclasses themselves.
+    """Alternatives of a union type that are dataclasses.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def _kinds(some: tuple[Any, ...]) -> dict[str, Kind]:
 
 
 def kinds(some: Sequence[Any]) -> dict[str, Kind]:
-    """What can be named where a value of some types is expected.
+    """Kinds of objects that may stand where a value of some types is expected.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def kinds(some: Sequence[Any]) -> dict[str, Kind]:
 
 
 def call(kind: Kind, arguments: Mapping[str, Any]) -> Any:
-    """A dataclass or a function called with arguments by name, `*several` among them.
+    """Call a dataclass or a function with arguments by name, `*args` among them.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def call(kind: Kind, arguments: Mapping[str, Any]) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """A bench by its name and arguments.
+    """Interferometer given by its name and arguments.
 
     Parameters
     ----------

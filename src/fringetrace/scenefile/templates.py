@@ -1,4 +1,4 @@
-"""Scene files to begin with, one for each bench, made from its signature; and one of a free scene."""
+"""Templates of scene files: one per interferometer, made from its signature, and one of a free scene."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ shape = [128, 128]
 
 
 def template(name: str) -> str:
-    """A scene file that runs.
+    """Text of a scene file that runs.
 
     Parameters
     ----------

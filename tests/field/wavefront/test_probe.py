@@ -11,8 +11,8 @@ from fringetrace.geometry import forms, shapes
 from fringetrace.scene import facet_groups
 
 
-def probe(*blockers, **options):
-    return visibility.survey(traced(*blockers), **options).probe
+def probe(*blockers):
+    return visibility.survey(traced(*blockers)).probe
 
 
 def test_a_probe_tells_where_light_takes_a_sequence():
@@ -44,13 +44,6 @@ def test_names_tell_parts_apart_that_keys_do_not():
     found, rows, names, _ = look.paths(at)
     assert len(np.unique(found.key[rows])) == 1
     assert names[0] == names[1] != names[2]
-
-
-def test_without_half_wave_loss_amplitudes_keep_their_sign():
-    at = np.array([[1.0, 1.0]])
-    for loss, sign in ((True, -1.0), (False, 1.0)):
-        paths, rows, _, _ = probe(half_wave_loss=loss).paths(at)
-        assert paths.amplitude[rows] == pytest.approx([sign])
 
 
 def test_edges_are_known_to_a_part_of_the_scene():

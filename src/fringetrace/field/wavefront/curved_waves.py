@@ -1,4 +1,4 @@
-"""Curved sheets of traced beams: patches between the nodes, and at edges patches fitted to rays inside."""
+"""Curved wavefronts: patches between grid nodes, and patches fitted to rays at edges."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from fringetrace.field.wavefront.quadtree import PIXEL, STRAIGHT, Pieces, Square
 from fringetrace.field.wavefront.ray_tubes import differences
 from fringetrace.field.wavefront.visibility import Survey, Witnesses
 from fringetrace.scene import CCD
+from fringetrace.tracing import components
 
 # Segments that an edge within a cell is drawn with, at most.
 SEGMENTS = 64
@@ -39,7 +40,7 @@ STENCIL = 5
 
 
 def curved(survey: Survey) -> tuple[list[PatchCells], FloatArray]:
-    """Sheets that met surfaces with a form, cut along their edges.
+    """Curved wavefronts off surfaces with a form, cut along their edges.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def _grid(survey: Survey, index: int) -> Sheet:
     probe = survey.probe
     found = sheet(survey.paths, survey.rows[index], probe.ccd, survey.shape)
     row, column = np.indices(survey.shape)
-    light = profile(probe.beam, np.stack([column.ravel(), row.ravel()], axis=1)).reshape(survey.shape)
+    light = profile(probe.beam, np.stack([column.ravel(), row.ravel()], axis=1)).reshape(*survey.shape, 1)
     return replace(found, amplitude=found.amplitude * light)
 
 
@@ -190,7 +191,7 @@ def _fitted(
     paths, rows, found, _ = probe.paths(starts)
     wanted = np.repeat(names[units[0]], at.shape[1])
     rows = rows[found == wanted[paths.ray[rows]]]
-    paths = replace(paths, amplitude=paths.amplitude * profile(probe.beam, starts)[paths.ray])
+    amplitude = (components(paths, probe.ccd) * profile(probe.beam, starts)[paths.ray]).T
     wave = units[0][paths.ray[rows] // at.shape[1]]
     fits = []
     for n, base in enumerate(bases):
@@ -198,7 +199,7 @@ def _fitted(
         part, arrived = pieces.wave == n, rows[wave == n]
         coefficients, turns, good, off = fitted(
             at[mine], low[mine], high[mine], paths.ray[arrived] - mine.start * at.shape[1],
-            arrivals(paths, arrived, probe.ccd), paths.amplitude[arrived], base, probe.ccd.shape,
+            arrivals(paths, arrived, probe.ccd), amplitude[arrived], base, probe.ccd.shape,
         )  # fmt: skip
         fit = PatchFit(
             pieces.part(part), owner[part] - mine.start, coefficients, turns, low[mine], high[mine]

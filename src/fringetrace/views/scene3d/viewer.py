@@ -1,4 +1,4 @@
-"""Scenes and benches to look at: a picture, a window, a page for a browser, files for other programs."""
+"""3D views of scenes and interferometers: picture, window, HTML page, export."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ONWARD = 0.3
 
 
 class Looks(TypedDict, total=False):
-    """How a scene is drawn; see `scene_view`."""
+    """Drawing options of a scene; see `view`."""
 
     colour: str
     wavelength: float | None
@@ -49,7 +49,7 @@ class Looks(TypedDict, total=False):
 
 
 def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
-    """A grid of rays of the same proportions, few enough to look at.
+    """Coarser grid of rays of the same proportions, for drawing.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def scene_view(
     tubes: float = 0.0,
     sweep: int = 1,
 ) -> View:
-    """What is to be drawn, as plain arrays.
+    """View of a scene as plain arrays.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def picture(
     size: tuple[int, int] = (1600, 1000),
     **looks: Unpack[Looks],
 ) -> None:
-    """A PNG of a scene, drawn off-screen in a process of its own.
+    """Write a PNG picture of a scene, drawn off-screen in a separate process.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def show(
     size: tuple[int, int] = (1600, 1000),
     **looks: Unpack[Looks],
 ) -> None:
-    """A window with a scene: to turn and zoom, with sliders, clipping, and rays to click on.
+    """Show a scene in a window, with sliders, a clipping plane and rays to click on.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def page(
     title: str = "fringetrace",
     **looks: Unpack[Looks],
 ) -> None:
-    """One HTML file with a scene to turn, to re-phase, to click on; it needs neither network nor server.
+    """Write an interactive HTML page of a scene: one file that needs neither network nor server.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def page(
 def export(
     scene: Scene | Interferometer, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
 ) -> None:
-    """Surfaces and rays for other programs: .glb, .ply or .vtp, in metres.
+    """Export surfaces and rays as .glb, .ply or .vtp, in metres.
 
     Parameters
     ----------
