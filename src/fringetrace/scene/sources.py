@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,10 +17,7 @@ from fringetrace.core import (
     filled,
     frame,
 )
-from fringetrace.scene.planes import Axes, checked_grid, checked_positive, checked_size
-
-if TYPE_CHECKING:
-    pass
+from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive, checked_size
 
 
 @dataclass(frozen=True)
@@ -114,7 +111,7 @@ class Beam:
     profile: Profile | None = None
     passes: tuple[str, ...] = ()
     polarisation: ComplexArray | None = None
-    axes: Axes = field(init=False, repr=False)  # of columns, rows, and the direction
+    axes: PlaneAxes = field(init=False, repr=False)  # of columns, rows, and the direction
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Beam centre"))

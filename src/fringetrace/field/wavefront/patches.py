@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame
+from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.field.wavefront.ray_tubes import along_grid, caustics, differences
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, pixels
 from fringetrace.tracing import Paths, components, landed
 
 # Of the fields of a cell (x, y, path, J) the amplitudes come last: two for each component.
@@ -176,18 +176,18 @@ def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
     -------
     Arrivals
     """
-    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
+    u, v, _ = ccd.axes
     chosen = paths.where(rows)
     _, point, length = landed(chosen, ccd)
-    offset, direction = point - ccd.centre, chosen.direction
+    pixel, direction = pixels(ccd, point), chosen.direction
     way, last = None, np.zeros(len(rows))
     if chosen.points is not None:
         bounces = int(chosen.bounces.max(initial=0))
         way = np.concatenate([chosen.points[:, : bounces + 1], point[:, None]], axis=1)
         last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
     return Arrivals(
-        x=offset @ u / ccd.pitch + 0.5 * ccd.shape[1],
-        y=offset @ v / ccd.pitch + 0.5 * ccd.shape[0],
+        x=pixel[:, 1],
+        y=pixel[:, 0],
         slope_x=chosen.gradient @ u * ccd.pitch,
         slope_y=chosen.gradient @ v * ccd.pitch,
         length=length,

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame, unit
+from fringetrace.core import Array, ComplexArray, FloatArray, unit
 from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront.boundary_search import cut
 from fringetrace.field.wavefront.probe import RIM, profile
 from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
 from fringetrace.optics import refract
-from fringetrace.scene import CCD, Beam, Surface
+from fringetrace.scene import CCD, Beam, Surface, pixels
 from fringetrace.tracing import Paths, Segments, components, landed
 
 
@@ -84,7 +84,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     assert paths.points is not None
     assert paths.starts is not None
     assert paths.branch is not None
-    u, v, direction = frame(beam.direction, beam.up, "Beam")
+    u, v, direction = beam.axes
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
     count = paths.bounces[row]
     legs = paths.points[row, 2 : count + 1] - paths.starts[row, 1:count]
@@ -102,7 +102,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
             # the step along the surface is the same on both sides
             across = across - np.outer(direction, (normal @ across) / (normal @ direction))
             direction = bent
-    right, up, facing = frame(ccd.normal, ccd.up, "CCD")
+    right, up, facing = ccd.axes
     # along the rays into the plane of focus
     across = across - np.outer(direction, (facing @ across) / (facing @ direction))
     _, point, length = landed(paths.where(np.array([row])), ccd)
@@ -112,7 +112,7 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     size = np.sqrt(beam.area / ccd.pitch**2 / spread) if spread > 0.0 else 0.0
     return Wave(
         name=name,
-        origin=axes @ (point[0] - ccd.centre) + 0.5 * np.array(ccd.shape[::-1]),
+        origin=pixels(ccd, point)[0, ::-1],
         matrix=matrix,
         start=start,
         path=float(length[0]),

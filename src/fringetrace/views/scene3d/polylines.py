@@ -279,8 +279,8 @@ def _ended(paths: Paths, onward: float) -> tuple[FloatArray, FloatArray, tuple[A
         seen = np.flatnonzero(paths.fate == Fate.DETECTED)
         ccd, direction = paths.ccd, paths.direction[seen]
         last = points[seen, end[seen]]
-        back = ((ccd.centre - last) @ ccd.normal) / (direction @ ccd.normal)
-        points[seen, end[seen]] = last + back[:, None] * direction
+        back = ccd.focus / (direction @ ccd.axes[2])  # to the plane of focus, as it was
+        points[seen, end[seen]] = last - back[:, None] * direction
     left = np.flatnonzero(paths.fate == Fate.LEFT)
     beyond = left, end[left] + 1
     assert paths.starts is not None
