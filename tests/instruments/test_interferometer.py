@@ -88,7 +88,7 @@ def test_streamed_fields_are_the_same(rays, threads):
 def test_streamed_fields_keep_no_paths(bench):
     seen = []
     bench.stream_fields(HENE, progress=lambda *counts: seen.append(counts))
-    assert bench.derived == {}
+    assert "paths" not in bench.derived
     assert seen
 
 

@@ -11,6 +11,9 @@ from fringetrace.scene.sensor import pixels
 from fringetrace.tracing.detection import project
 from fringetrace.tracing.paths import join
 
+# Rays are cut off on purpose: what becomes of them is looked at here, that it is warned of in `test_checks`.
+pytestmark = pytest.mark.filterwarnings("ignore:power is cut off")
+
 LEDGER = 1e-12
 ROUNDING = 1e-14
 

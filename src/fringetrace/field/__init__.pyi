@@ -1,3 +1,4 @@
+from .checks import aliasing as aliasing
 from .coherent_sum import (
     PixelLight as PixelLight,
     chosen as chosen,

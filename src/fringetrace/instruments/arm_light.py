@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fringetrace.core import ComplexArray
-from fringetrace.field import centred, chosen, complex_field, mutual_intensity
+from fringetrace.field import centred, chosen, light_on
 from fringetrace.instruments.arms import Mark
 from fringetrace.scene import Beam
 from fringetrace.tracing import Paths
@@ -29,7 +29,7 @@ def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> Comp
     """
     if chosen(paths, method) == "rays":
         return ray_sums(paths, mark, wavelength)
-    fields = complex_field(paths, wavelength, groups=mark.count(paths), method="wavefront")
+    fields = light_on(paths, wavelength, "wavefront").complex_field(wavelength, mark.count(paths))
     return _padded(fields, 1)
 
 
@@ -46,7 +46,8 @@ def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float) -> Complex
     (n, n, rows, columns) complex128, n at least 2
         Summed over the components of polarised light.
     """
-    return _padded(mutual_intensity(paths, wavelength, groups=mark.count(paths), method="wavefront"), 2)
+    light = light_on(paths, wavelength, "wavefront")
+    return _padded(light.mutual_intensity(wavelength, mark.count(paths)), 2)
 
 
 def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
@@ -69,7 +70,8 @@ def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
     count = mark.count(landed)
     landed = centred(landed, max(1, paths.source.shape[1] // paths.ccd.shape[1]))
     orders = range(max(2, int(count.max(initial=0)) + 1))
-    return np.stack([complex_field(landed.where(count == order), wavelength, "rays") for order in orders])
+    parts = (landed.where(count == order) for order in orders)
+    return np.stack([light_on(part, wavelength, "rays").complex_field(wavelength) for part in parts])
 
 
 def add_orders(one: ComplexArray, other: ComplexArray, axes: int = 1) -> ComplexArray:

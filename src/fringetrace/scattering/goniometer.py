@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fringetrace.accuracy import hit_error
 from fringetrace.core import FloatArray, FringetraceWarning, array, checked_wavelengths
 from fringetrace.scattering.detectors import Cells, Cones, Detector, Pixels, checked_angles
-from fringetrace.scattering.far_fields import FATES, Far, far_field, mean
+from fringetrace.scattering.far_fields import FATES, Far, far_field, mean, warn_of_losses
 from fringetrace.scattering.illumination import (
     Illumination,
     Polarisation,
@@ -151,6 +151,7 @@ def amplitudes(
         far_field(lighting, *pair, detector, waves, method=method, jones=jones, **options)
         for pair, (jones,) in zip(pairs, lights, strict=True)
     ]
+    warn_of_losses(fars)
     sums = np.reshape([far.amplitude for far in fars], (len(theta), len(phi), *fars[0].amplitude.shape))
     unit = {"units": "m2", "long_name": "sum of area * amplitude", "method": method}
     where = _coordinates(theta, phi, detector, waves)
@@ -265,6 +266,7 @@ def brdf(
         fars.append(mean(each))
         if progress is not None:
             progress(i + 1, len(pairs))
+    warn_of_losses(fars)
     values = np.stack([_density(far, detector, waves, method) for far in fars])
     if reciprocal:
         square = values.reshape(len(pairs), len(pairs), -1)
@@ -384,5 +386,5 @@ def rounding_error(scene: Scene, theta: float, wavelength: float, **options: Any
     limits |= {name: options[name] for name in limits if name in options}
     lighting = Illumination(scene, rays=(1, PROBES), **known)
     at = None if needs(scene) is None else wavelength
-    paths = trace(scene, lighting.light(theta, 0.0), wavelength=at, record=True, **limits)
+    paths = trace(scene, lighting.light(theta, 0.0), wavelength=at, record=True, warn=False, **limits)
     return hit_error(paths.where((paths.fate == Fate.LEFT) & (paths.bounces > 0)), wavelength)

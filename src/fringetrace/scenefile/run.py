@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace.accuracy import checks
+from fringetrace.accuracy import checks, judge
 from fringetrace.core import Array, ComplexArray, FloatArray, FringetraceWarning, nm, staged, tables
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.geometry import write_height_map
@@ -79,10 +79,10 @@ class Run:
         return found
 
     def traced(self, beam: Beam, ccd: CCD | None, wavelength: float | None, record: bool = False) -> Paths:
-        """Trace one beam through the scene."""
+        """Trace one beam through the scene; what there is to warn of is said beside the budget."""
         return trace(
             self.experiment.scene, beam, ccd, wavelength=wavelength, max_bounces=self.experiment.max_bounces,
-            min_amplitude=self.experiment.min_amplitude, record=record,
+            min_amplitude=self.experiment.min_amplitude, record=record, warn=False,
         )  # fmt: skip
 
     def image(self, wavelength: float) -> FloatArray:
@@ -175,13 +175,14 @@ def _traced(current: Run, wavelength: float) -> Iterator[tuple[str, str]]:
         for item in ("detected", "left", "absorbed", "truncated")
     )
     yield "power", f"{shares}; unaccounted for {power.error:.1e} of the incident"
-    if every[0].ccd is None:
-        return
     for number, paths in enumerate(every):
-        method = chosen(paths, current.method)
-        costs, notes = checks.judge(paths, wavelength, method)
-        yield "budget", f"{f'beam {number}' if len(every) > 1 else 'of the image'}: {costs.line}"
-        yield from (("note", note) for note in notes)
+        if paths.ccd is None:
+            problems = checks.found(paths, wavelength)
+        else:
+            costs, problems = judge(paths, wavelength, chosen(paths, current.method))
+            yield "budget", f"{f'beam {number}' if len(every) > 1 else 'of the image'}: {costs.line}"
+        paths.warned.update(problems)
+        yield from (("note", note) for note in problems.values())
 
 
 def _named(wavelength: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.tracing.batch import Batch, Carried, Ends, blank, grown, part
+from fringetrace.tracing.checks import CROWD, EACH, warn_of_crowd
 from fringetrace.tracing.fates import Fate
 from fringetrace.tracing.rays import Rays, launch
 
@@ -26,7 +28,8 @@ class Plan:
 
     `plain`: all surfaces reflect with -1, so that amplitudes follow from the number of bounces.
     `splits`: some surface sends light both ways, so that a ray may have many ends. `matter` is None where
-    light meets nothing but constant amplitudes in a vacuum.
+    light meets nothing but constant amplitudes in a vacuum. `warned` are the names of warnings that were
+    given; None: there are to be none.
     """
 
     scene: Scene
@@ -44,6 +47,7 @@ class Plan:
     plain: bool
     splits: bool
     matter: Optics | None = None
+    warned: set[str] | None = None
 
     @property
     def total(self) -> int:
@@ -264,6 +268,7 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
             space.ends = ends = grown(ends, 2 * (ended + 2 * count))
         state, hits = space.state, space.hits
         segments += count
+        watch(plan, state, count, len(rays))
         doubtful += nearest(plan, space, count, passed)
         passed = frozenset()
         before: dict[str, Array] = {}
@@ -280,6 +285,14 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
         if record is not None:
             _noted(record, plan, before, space, count, slice(old, ended))
     return Chunk(ends, ended, rays, segments, doubtful, record)
+
+
+def watch(plan: Plan, batch: Batch, count: int, launched: int) -> None:
+    """Warn of paths that multiply: `count` are under way, of `launched` rays."""
+    if plan.warned is None or count < max(CROWD, EACH * launched):
+        return
+    surface, bounces = plan.engine.owner[batch.last[:count]], int(batch.bounces[:count].max())
+    warn_of_crowd(plan.scene, surface, launched, bounces, math.sqrt(plan.faint), plan.warned)
 
 
 def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.tracing.batch import Batch, Carried, Ends, grown
 from fringetrace.tracing.fates import ABSORBED, ALIVE, FAINT
-from fringetrace.tracing.loop import Chunk, Plan, Record, Workspace, nearest, start
+from fringetrace.tracing.loop import Chunk, Plan, Record, Workspace, nearest, start, watch
 from fringetrace.tracing.rays import Rays
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ def traverse(plan: Plan, space: Workspace, first: int, stop: int) -> Chunk:
     while state.count:
         state.room(2 * state.count)
         segments += state.count
+        watch(plan, state.batch, state.count, len(rays))
         doubtful += nearest(plan, space, state.count, passed)
         passed = frozenset()
         hits = space.hits

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fringetrace.core import Array, ComplexArray, checked_whole
+from fringetrace.core import Array, ComplexArray, checked_whole, warn_once
 from fringetrace.scene import CCD, Beam, Scene, screen
 from fringetrace.tracing.batch import Carried, Ends, blank, part
+from fringetrace.tracing.checks import Losses
 from fringetrace.tracing.loop import Plan, Record, Workspace, advance, tables
 from fringetrace.tracing.paths import Paths, join
 from fringetrace.tracing.rays import Rays
@@ -43,7 +44,7 @@ def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
 
 def _plan(
     scene: Scene, source: Beam | Rays, ccd: CCD | None, wavelength: float | None, max_bounces: int,
-    min_amplitude: float, record: bool,
+    min_amplitude: float, record: bool, warned: set[str] | None,
 ) -> Plan:  # fmt: skip
     if not isinstance(scene, Scene):
         raise TypeError(f"trace: expected a Scene, got {type(scene).__name__}")
@@ -79,6 +80,7 @@ def _plan(
         plain=matter is None and bool((reflection == -1.0).all() and not transmission.any()),
         splits=matter is not None or bool((abs(reflection) * abs(transmission)).any()),
         matter=matter,
+        warned=warned,
     )
 
 
@@ -262,22 +264,29 @@ def stream(
     threads: int | None = None,
     chunk: int | None = None,
     progress: Progress | None = None,
+    warn: bool | set[str] = True,
 ) -> Iterator[Paths]:
     """Trace in chunks, which need not fit into memory together; arguments as for `trace`.
 
     Parameters
     ----------
-    scene, source, ccd, wavelength, max_bounces, min_amplitude, record, threads, chunk, progress
+    scene, source, ccd, wavelength, max_bounces, min_amplitude, record, threads, chunk, progress, warn
         See `trace`.
 
     Yields
     ------
     Paths
         Of consecutive rays, in their order.
+
+    Warns
+    -----
+    FringetraceWarning
+        Behind the last of them, as `trace`.
     """
-    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
+    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record, _given(warn))
     workers = None if threads is None else checked_whole(threads, 1, "threads")
-    return _in_chunks(plan, workers, _chunk(plan, chunk), progress)
+    chunks = _in_chunks(plan, workers, _chunk(plan, chunk), progress)
+    return chunks if plan.warned is None else _warned(chunks, plan.warned)
 
 
 def trace(
@@ -292,6 +301,7 @@ def trace(
     threads: int | None = None,
     chunk: int | None = None,
     progress: Progress | None = None,
+    warn: bool | set[str] = True,
 ) -> Paths:
     """Trace rays through a scene until they are detected, leave, or are cut off.
 
@@ -317,6 +327,9 @@ def trace(
         same bits for any number.
     progress : callable, optional
         Called with (rays done, rays in all) after each chunk.
+    warn : bool or set of str
+        False: warn of nothing. A set: the names of warnings that were given before, and are not given again;
+        those given now are added.
 
     Returns
     -------
@@ -329,10 +342,39 @@ def trace(
     ValueError
         For counts or amplitudes below 0, or names of unknown surfaces in the source's `passes`; for a
         wavelength that is missing, or outside the range of a material.
+
+    Warns
+    -----
+    FringetraceWarning
+        If over a millionth of the power is cut off, media contradict, a boundary is open, or paths multiply;
+        see `fringetrace.tracing.checks`.
     """
-    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
+    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record, _given(warn))
     workers = None if threads is None else checked_whole(threads, 1, "threads")
     size = _chunk(plan, chunk)
     if not (plan.splits or record):
-        return _at_once(plan, workers, size, progress)
-    return join(list(_in_chunks(plan, workers, size, progress)))
+        paths = _at_once(plan, workers, size, progress)
+    else:
+        paths = join(list(_in_chunks(plan, workers, size, progress)))
+    if plan.warned is not None:
+        paths.derived["warned"] = plan.warned
+        warn_once(Losses.of(paths).problems, plan.warned)
+    return paths
+
+
+def _given(warn: bool | set[str]) -> set[str] | None:
+    """Names of the warnings that were given before; None: there are to be no warnings."""
+    if isinstance(warn, set):
+        return warn
+    return set() if warn else None
+
+
+def _warned(chunks: Iterator[Paths], given: set[str]) -> Iterator[Paths]:
+    """Chunks of a trace, and warnings behind the last of them."""
+    losses: Losses | None = None
+    for paths in chunks:
+        paths.derived["warned"] = given
+        losses = Losses.of(paths) if losses is None else losses + Losses.of(paths)
+        yield paths
+    if losses is not None:
+        warn_once(losses.problems, given)
