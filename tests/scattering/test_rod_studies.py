@@ -147,6 +147,7 @@ def test_light_keeps_its_etendue_through_a_face():
         assert table[0, 1] == pytest.approx(table[1, 0], rel=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_rigorous_and_ray_studies_take_either_polarisation(serial):
     """E, H, and their mean; each as `cluster` and the goniometer have it."""
     kind, given = RodLattice(3, 2, rod=1.6, host=1.4), ([0.3], [-0.3, 0.2], WAVES[:2])
