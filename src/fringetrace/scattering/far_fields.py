@@ -204,18 +204,19 @@ def far_field(
     return Far(total, power, count, fates, incident / len(bands), reduce(add, losses))
 
 
-def warn_of_losses(fars: Sequence[Far]) -> None:
+def warn_of_losses(fars: Sequence[Far], given: set[str]) -> None:
     """Warn of light that was not followed to its end, or came to boundaries in the wrong medium, once each.
 
     Parameters
     ----------
     fars : sequence of Far
+    given : set of str
+        Names of warnings that were given before; those given now are added.
 
     Warns
     -----
     FringetraceWarning
         Of the one that lost most.
     """
-    given: set[str] = set()
     for far in sorted(fars, key=lambda far: -far.losses.share):
         warn_once(far.losses.problems, given)

@@ -151,7 +151,7 @@ def amplitudes(
         far_field(lighting, *pair, detector, waves, method=method, jones=jones, **options)
         for pair, (jones,) in zip(pairs, lights, strict=True)
     ]
-    warn_of_losses(fars)
+    warn_of_losses(fars, set())
     sums = np.reshape([far.amplitude for far in fars], (len(theta), len(phi), *fars[0].amplitude.shape))
     unit = {"units": "m2", "long_name": "sum of area * amplitude", "method": method}
     where = _coordinates(theta, phi, detector, waves)
@@ -175,6 +175,7 @@ def brdf(
     polarisation: Polarisation = None,
     reciprocal: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    warned: set[str] | None = None,
     **options: Any,
 ) -> DataArray:
     """Bidirectional reflectance distribution function (BRDF), radiance over incident irradiance.
@@ -213,6 +214,8 @@ def brdf(
         become p and not go back as s. See `reciprocity`.
     progress : callable, optional
         Called with (incidences done, incidences in all).
+    warned : set of str, optional
+        Names of warnings that were given before, and are not given again; see `trace`.
     options
         max_bounces : int, surfaces that a path may meet, default 100;
         min_amplitude : float, branches below this part of the launched amplitude are cut off, default 1e-6;
@@ -238,6 +241,11 @@ def brdf(
         For angles, wavelengths or lengths out of range, an unknown method, "diffraction" onto pixels,
         a polarisation that is none or beside a source, `reciprocal` without the same angles on both
         sides or with polarised light.
+
+    Warns
+    -----
+    FringetraceWarning
+        As `trace`, once of all incidences; with "diffraction", if rays are too far apart.
 
     Notes
     -----
@@ -266,7 +274,7 @@ def brdf(
         fars.append(mean(each))
         if progress is not None:
             progress(i + 1, len(pairs))
-    warn_of_losses(fars)
+    warn_of_losses(fars, set() if warned is None else warned)
     values = np.stack([_density(far, detector, waves, method) for far in fars])
     if reciprocal:
         square = values.reshape(len(pairs), len(pairs), -1)

@@ -89,10 +89,10 @@ class Run:
         """Irradiance |E|^2, (rows, columns)."""
 
         def find() -> FloatArray:
-            if self.bench is None:
-                return irradiance(self.paths(wavelength), wavelength, self.method)
             with warnings.catch_warnings():  # they are said beside the budget
                 warnings.simplefilter("ignore", FringetraceWarning)
+                if self.bench is None:
+                    return irradiance(self.paths(wavelength), wavelength, self.method)
                 return self.bench.interferogram(wavelength)
 
         found: FloatArray = self.kept(("image", wavelength), find)

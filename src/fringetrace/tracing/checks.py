@@ -16,7 +16,7 @@ from fringetrace.tracing.paths import Paths
 CUT = 1e-6
 # Paths multiply where so many are under way for each ray of a chunk, and so many in all: 100 MB.
 EACH, CROWD = 64, 2**17
-MULTIPLYING = "paths multiply"
+CUT_OFF, MULTIPLYING = "power is cut off", "paths multiply"
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +103,7 @@ class Losses:
     def problems(self) -> dict[str, str]:
         """All that there is to warn of: the text of each warning by its name."""
         texts = {
-            "power is cut off": power_cut(self),
+            CUT_OFF: power_cut(self),
             "media contradict": media_contradiction(self),
             "glass is open": open_boundary(self.scene),
         }
@@ -136,7 +136,7 @@ def power_cut(losses: Losses) -> str | None:
     )
     remedy = "more bounces" if losses.bounced > losses.faint else "a smaller least amplitude"
     return (
-        f"power is cut off: {causes}, as parts of the incident power{behind}, the brightest path at "
+        f"{CUT_OFF}: {causes}, as parts of the incident power{behind}, the brightest path at "
         f"({place}) m; allow {remedy}"
     )
 
@@ -216,7 +216,7 @@ def warn_of_crowd(
         return
     name = scene.surfaces[int(np.bincount(surface).argmax())].name
     text = (
-        f"paths multiply: {launched:,} rays have become {count:,} paths after {bounces} surfaces, most "
+        f"{MULTIPLYING}: {launched:,} rays have become {count:,} paths after {bounces} surfaces, most "
         f"of them at {name!r}; allow fewer bounces, a larger least amplitude than {min_amplitude:g}, or "
         "follow one branch of a boundary"
     )
