@@ -236,6 +236,9 @@ class Rig:
         if not isinstance(light, (Spectrum, Line)):
             return self._found(light, mutual_intensity)
         spectrum = self.spectrum(light)
+        paths = self.trace(float(spectrum.wavelengths[0]))
+        if needs(self.scene) is None and chosen(paths, self.method) == "wavefront":
+            return _from_two(mutual_intensity(paths, spectrum, self._counted(paths), "wavefront"))
         total = np.zeros((2, 2, *self.ccd.shape), dtype=np.complex128)
         for wavelength, share in zip(spectrum.wavelengths.tolist(), spectrum.weights, strict=True):
             part = share * self._found(wavelength, mutual_intensity)
@@ -262,10 +265,7 @@ class Rig:
             if find is mutual_intensity:
                 return products(self.fields(wavelength))
             return self._summed(paths.detected, wavelength)
-        light = find(paths, wavelength, groups=self._counted(paths), method="wavefront")
-        groups = light.shape[:-2]
-        missing = [(0, max(0, 2 - n)) for n in groups]
-        return np.pad(light, [*missing, (0, 0), (0, 0)])
+        return _from_two(find(paths, wavelength, groups=self._counted(paths), method="wavefront"))
 
     def _counted(self, paths: Paths) -> npt.NDArray[np.int64]:
         """How often a phase step turns each path."""
@@ -313,6 +313,12 @@ class Rig:
         count, paths = self._counted(paths), centred(paths, parts)
         orders = range(max(2, int(count.max(initial=0)) + 1))
         return np.stack([complex_field(paths.where(count == order), wavelength, "rays") for order in orders])
+
+
+def _from_two(light: ComplexArray) -> ComplexArray:
+    """Fields or mutual intensities of two groups at least."""
+    missing = [(0, max(0, 2 - n)) for n in light.shape[:-2]]
+    return np.pad(light, [*missing, (0, 0), (0, 0)])
 
 
 def _served(latest: Paths, kept: Paths, wavelength: float | None) -> Paths | None:
