@@ -11,6 +11,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -22,7 +23,7 @@ HENE, PIXELS, RADIUS = 632.8 * nm, 512, 20.0
 WHITE = ft.Spectrum(np.linspace(600, 660, 20) * nm, np.ones(20))
 
 
-def michelson(rays: float, pixels: int = PIXELS, tilt: float = 2e-4) -> instruments.Bench:
+def michelson(rays: float, pixels: int = PIXELS, tilt: float = 2e-4) -> instruments.Interferometer:
     """A hollow mirror of 20 m radius in the arm of the sample, so many rays a pixel along either axis."""
     along = np.linspace(-4 * mm, 4 * mm, 65)
     mesh = shapes.height_map(-(along**2 + along[:, None] ** 2) / (2 * RADIUS), along[1] - along[0])
@@ -33,7 +34,9 @@ def michelson(rays: float, pixels: int = PIXELS, tilt: float = 2e-4) -> instrume
     )  # fmt: skip
 
 
-def seconds(work: Callable[[instruments.Bench], object], rays: float, tilt: float, runs: int = 3) -> float:
+def seconds(
+    work: Callable[[instruments.Interferometer], object], rays: float, tilt: float, runs: int = 3
+) -> float:
     """Least CPU time of some work on a bench that is not traced yet."""
     least = np.inf
     for _ in range(runs):
@@ -44,13 +47,13 @@ def seconds(work: Callable[[instruments.Bench], object], rays: float, tilt: floa
     return least
 
 
-def field_and_irradiance(bench: instruments.Bench) -> None:
+def field_and_irradiance(bench: instruments.Interferometer) -> None:
     """Both, at one wavelength."""
     bench.field(HENE)
     bench.interferogram(HENE)
 
 
-def image_and_budget(bench: instruments.Bench) -> None:
+def image_and_budget(bench: instruments.Interferometer) -> None:
     """An interferogram and then its budget."""
     bench.interferogram(HENE)
     bench.budget(HENE)

@@ -7,7 +7,7 @@ import fringetrace as ft
 from fringetrace import instruments, mm, nm
 from fringetrace.field.wavefront import wavefronts
 from fringetrace.geometry import forms, shapes
-from fringetrace.instruments import rig
+from fringetrace.instruments import interferometer
 
 HENE = 632.8 * nm
 WHITE = ft.Spectrum(np.linspace(500, 700, 20) * nm, np.ones(20))
@@ -19,7 +19,7 @@ ROUNDING = 1e-12
 def counts(monkeypatch):
     """Traces of benches, and paths of which wavefronts are reconstructed."""
     traces, surveys = [], []
-    trace, survey = rig.trace, wavefronts.survey
+    trace, survey = interferometer.trace, wavefronts.survey
 
     def tracing(*given, **named):
         traces.append(given)
@@ -29,7 +29,7 @@ def counts(monkeypatch):
         surveys.append(paths)
         return survey(paths)
 
-    monkeypatch.setattr(rig, "trace", tracing)
+    monkeypatch.setattr(interferometer, "trace", tracing)
     monkeypatch.setattr(wavefronts, "survey", surveying)
     return traces, surveys
 

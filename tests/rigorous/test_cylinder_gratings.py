@@ -144,3 +144,33 @@ def test_spectrum_rejects():
     metal = CylinderGratings(200 * nm, 160 * nm, [Row(80 * nm, 50 * nm, CONDUCTOR)], 1.5)
     with pytest.raises(ValueError, match="Method 'multilayer': expected finite refractive indices"):
         reflectance_spectrum(metal, 500 * nm, method="multilayer")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"wavelength": np.inf}, "Wavelength: expected positive lengths in metres, got inf"),
+        ({"wavelength": []}, r"Wavelength: expected at least one, got shape \(0,\)"),
+        ({"angle": np.nan}, "Angle of incidence: expected finite angles in radians, got nan"),
+        ({"orders": -1}, "Orders: expected a whole number of at least 0, got -1"),
+        ({"harmonics": 2.5}, "Harmonics: expected a whole number of at least 0, got 2.5"),
+    ],
+)
+def test_diffract_refuses(options, message):
+    lattice = CylinderGratings(1e-6, 3e-6, [Row(1e-6, 2e-7, 1.5)], 1.0)
+    with pytest.raises(ValueError, match=message):
+        diffract(lattice, **{"wavelength": 5e-7, **options})
+
+
+def test_rows_need_an_index():
+    with pytest.raises(ValueError, match="Index: expected a refractive index n"):
+        diffract(CylinderGratings(1e-6, 3e-6, [Row(1e-6, 2e-7, None)], 1.0), 5e-7)
+    with pytest.raises(ValueError, match="Lattice: expected positive lengths in metres, got pitch inf"):
+        CylinderGratings(np.inf, 3e-6, [], 1.0)
+
+
+def test_counts_may_be_of_any_type_of_integer():
+    lattice = CylinderGratings(1e-6, 3e-6, [Row(1e-6, 2e-7, 1.5)], 1.0)
+    plain = diffract(lattice, 5e-7, orders=9, harmonics=0)
+    other = diffract(lattice, 5e-7, orders=np.uint64(9), harmonics=np.int8(0))
+    assert np.array_equal(other.transmitted, plain.transmitted)

@@ -58,3 +58,33 @@ def test_polarisation_is_checked():
         effective_index(np.ones(1), np.ones(1, complex), "p")
     with pytest.raises(ValueError, match="Polarisation: expected 'E' or 'H', got 's'"):
         stack_powers([1.0], [1.5], 1.0, 1.0, 1.0, 0.0, "s")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"index": [math.nan]}, "Layers: expected a refractive index n"),
+        ({"index": [None]}, "Layers: expected a refractive index n"),
+        ({"front": 0.0}, "Front: expected a refractive index n"),
+        ({"back": math.nan}, "Back: expected a refractive index n"),
+        ({"wavelength": 0.0}, "Wavelength: expected positive lengths in metres, got 0"),
+        ({"wavelength": [5e-7, math.inf]}, "Wavelength: expected positive lengths in metres, got inf"),
+        ({"angle": math.nan}, "Angle of incidence: expected finite angles in radians, got nan"),
+        ({"thickness": [-1.0]}, "Layers: expected thicknesses of 0 or more metres"),
+        ({"thickness": [1.0, 1.0]}, "Layers: expected thicknesses of 0 or more metres"),
+    ],
+)
+def test_stack_refuses(change, message):
+    light = {"thickness": [1e-7], "index": [1.5], "front": 1.0, "back": 1.5, "wavelength": 5e-7, "angle": 0.1}
+    with pytest.raises(ValueError, match=message):
+        stack_powers(**{**light, **change}, polarisation="E")
+
+
+def test_no_layers_are_a_bare_face():
+    bare, one = (stack_powers([0.0] * n, [1.3] * n, 1.0, 1.5, 5e-7, [0.1, 0.2], "H") for n in (0, 1))
+    np.testing.assert_allclose(bare, one, rtol=1e-14)
+
+
+def test_effective_index_refuses_none():
+    with pytest.raises(ValueError, match="Layers: expected a refractive index n"):
+        effective_index([0.5, 0.5], [1.0, math.nan], "E")

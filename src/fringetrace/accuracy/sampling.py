@@ -1,4 +1,4 @@
-"""What the number of rays, and of points in a pixel, costs a field: in waves, without knowing the truth."""
+"""Sampling errors of a field: by the number of rays and by the quadrature in pixels, in waves."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray
 from fringetrace.field import centred, complex_field, reconstruct
-from fringetrace.scene import CCD, Beam, pixels
+from fringetrace.scene import CCD, Beam, crop, pixels
 from fringetrace.tracing import Paths
 
 # Bands of the image that stand for all of it: their middles, in parts of its height, and pixel rows in each.
@@ -34,7 +34,7 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
 
 
 def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
-    """Rows of pixels that stand for all: some near the lower end, the middle, the upper end.
+    """Bands of pixel rows that represent all: near the lower end, the middle, the upper end.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, 
 
 def _parts(ccd: CCD) -> list[CCD]:
     """Parts of a CCD that stand for all of it, for the ray sum."""
-    return [_cut(ccd, top, stop - top, ccd.shape[1]) for top, stop in sample_bands(ccd.shape, MANY)]
+    return [crop(ccd, top, stop - top, ccd.shape[1]) for top, stop in sample_bands(ccd.shape, MANY)]
 
 
 def _onto(paths: Paths, ccd: CCD) -> Paths:
@@ -66,17 +66,8 @@ def _onto(paths: Paths, ccd: CCD) -> Paths:
     return replace(paths.where(inside), ccd=ccd)
 
 
-def _cut(ccd: CCD, row: int, rows: int, columns: int, size: int = 1) -> CCD:
-    """Rows of a CCD from one on, and columns from the first on; pixels of size x size of its own as one."""
-    u, v, _ = ccd.axes
-    middle_u = 0.5 * (columns - ccd.shape[1]) * ccd.pitch
-    middle_v = (row + 0.5 * (rows - ccd.shape[0])) * ccd.pitch
-    shape = (rows // size, columns // size)
-    return replace(ccd, centre=ccd.centre + middle_u * u + middle_v * v, pitch=ccd.pitch * size, shape=shape)
-
-
 def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0) -> float:
-    """What the number of rays costs the wavefront method.
+    """Sampling error of the wavefront method, from coarser grids of rays.
 
     The error falls from grid to grid as it is seen to fall, by 16 at most: the method's fourth order.
 
@@ -101,7 +92,7 @@ def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0
 
 
 def quadrature_error(paths: Paths, wavelength: float) -> float:
-    """What the points in each pixel cost the wavefront method: some more of them along either axis.
+    """Quadrature error of the wavefront method, from more points along either axis of the pixels.
 
     Parameters
     ----------
@@ -122,7 +113,7 @@ def _in_bands(paths: Paths, wavelength: float, more: int = 0) -> list[ComplexArr
 
 
 def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
-    """Rays that stand for the mean of their plane wave over their part of the pixel that they fall in.
+    """Rays averaged as plane waves over their part of a pixel.
 
     Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
     part, see `centred`, and has its amplitude times sinc of the cycles over the part, along either side.
@@ -146,7 +137,7 @@ def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
 
 
 def offset_error(paths: Paths, wavelength: float) -> float:
-    """What it costs the ray sum that a ray counts where it lands, not by its mean over part of the pixel.
+    """Offset error of the ray sum: rays count where they land, not as means over part of a pixel.
 
     Parameters
     ----------
@@ -165,7 +156,7 @@ def offset_error(paths: Paths, wavelength: float) -> float:
 
 
 def count_error(paths: Paths, wavelength: float) -> float:
-    """What it costs the ray sum that pixels get more or fewer rays than their share of light.
+    """Counting error of the ray sum: pixels get more or fewer rays than their share of light.
 
     Every second ray either way, on pixels twice as large, against all of them: there are as many
     rays a pixel, so the smaller sum is off by as much as the image itself.
@@ -187,7 +178,7 @@ def count_error(paths: Paths, wavelength: float) -> float:
         rows, columns = (n - n % 2 for n in ccd.shape)
         if rows == 0 or columns == 0:
             return 0.0
-        all_ = _onto(seen, _cut(ccd, 0, rows, columns, size=2))
+        all_ = _onto(seen, crop(ccd, 0, rows, columns, binning=2))
         row, column = np.divmod(all_.ray, paths.source.shape[1])
         few = all_.where(_even(row) & _even(column))
         assert few.area is not None

@@ -1,4 +1,4 @@
-"""What the command does for structural colour: meshes and lattices in, BRDFs and figures out."""
+"""Commands for structural colour: `brdf` of a mesh, `lattice` for rod lattices."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def brdf(
     measured: Path | None = None,
     threads: int | None = None,
 ) -> Lines:
-    """BRDF of a mesh of mirrors or of matter, its normal along z: spectra from each angle into each.
+    """BRDF of a mesh of mirrors or matter, its normal along z: spectra between all pairs of angles.
 
     Written to the folder OUT: brdf.nc (labelled, NetCDF), brdf.csv (a row for each pair of angles and
     wavelength), spectra.png; measured.png, if spectra are to be laid over.
@@ -147,7 +147,7 @@ def lattice(
     measured: Path | None = None,
     scheduler: str | None = None,
 ) -> Lines:
-    """BRDF of lattices of rods, for every combination of the values given.
+    """BRDF of rod lattices, for every combination of the given values.
 
     What is done is kept in OUT/cells as it comes; the same command goes on where it was stopped.
     Written to the folder OUT: brdf.nc, brdf.csv, spectra.png.

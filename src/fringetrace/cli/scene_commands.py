@@ -1,4 +1,4 @@
-"""What the command does for scene files: run, begun, looked at."""
+"""Commands for scene files: `run`, `init` and `view`."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False)
 
 
 def init(name: str, /) -> Iterator[tuple[str, str]]:
-    """Print a scene file to begin with, as it runs: `fringetrace init michelson > my.toml`.
+    """Print a template of a scene file: `fringetrace init michelson > my.toml`.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def view(
     surfaces: str = "interface",
     allow_outside: bool = False,
 ) -> Lines:
-    """Look at a scene file, or at a mesh: in a window, or in files that say what they show.
+    """View a scene file or a mesh in 3D: in a window, or as picture, HTML page or 3D file.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The same call over many parameters: on this machine's cores, or on a Dask cluster; kept as they come."""
+"""Parameter sweeps on local cores, an executor or a Dask cluster, with results kept on disk."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ALONE = "result"
 
 
 def grid(**axes: Sequence[Any]) -> list[dict[str, Any]]:
-    """Every combination of some parameters, the last changing first.
+    """Cartesian product of parameters; the last one varies fastest.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def _named(function: Callable[..., Any]) -> str:
 
 
 def key(function: Callable[..., Any], cell: Cell) -> str:
-    """Name of a cell's file: a digest of the function's name and of the parameters.
+    """File name of a sweep cell: digest of the function's name and its parameters.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def sweep(
     processes: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[CellResult]:
-    """Call a function with each of many sets of parameters; the results in their order.
+    """Call a function for each set of parameters, in parallel; results in the order of the parameters.
 
     With a folder each result is kept in a file of its own as soon as it is there, and cells whose file
     is there already are read, not computed: the same sweep goes on where it was stopped, however it

@@ -1,4 +1,4 @@
-"""From arrivals to light on the pixels: complex fields, irradiance, mutual intensity."""
+"""Coherent sum on the pixels: complex field, irradiance and mutual intensity of traced paths."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ from fringetrace.tracing import Paths, at_wavelength, join, needs
 
 
 class PixelLight(Protocol):
-    """PixelLight on the pixels of a CCD, however it is found: what `complex_field` and its kin ask."""
+    """Protocol of light on the pixels of a CCD, by wavefronts or by a ray sum."""
 
     def complex_field(
         self, wavelength: float, groups: npt.ArrayLike | None = None, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """See `complex_field`."""
+        """Complex field, averaged over each pixel; see `complex_field`."""
 
     def irradiance(self, light: float | Spectrum, half_wave_loss: bool = True) -> FloatArray:
-        """See `irradiance`."""
+        """Irradiance, averaged over each pixel; see `irradiance`."""
 
     def mutual_intensity(
         self, light: float | Spectrum, groups: npt.ArrayLike, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """See `mutual_intensity`."""
+        """Mutual intensity, averaged over each pixel; see `mutual_intensity`."""
 
 
 # A wavefront is worth its while where so many rays of the beam share a facet, or facets are so few.
@@ -37,7 +37,7 @@ SHARING, FEW = 16, 64
 
 
 def method_for(paths: Paths) -> str:
-    """The method that "auto" stands for.
+    """Method that "auto" stands for: wavefront or ray sum.
 
     "wavefront" for a `Beam` whose rays are at least `SHARING` times as many as the flat facets of the
     scene (coplanar triangles are one; surfaces with a form have none), or where those are `FEW`;
@@ -66,7 +66,7 @@ def method_for(paths: Paths) -> str:
 
 
 def torn(paths: Paths) -> str | None:
-    """Name of a surface that tears waves: an element behind which neighbouring rays may fare differently.
+    """Name of a surface that tears wavefronts: an element that treats neighbouring rays differently.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def complex_field(
     half_wave_loss: bool = True,
     groups: npt.ArrayLike | None = None,
 ) -> ComplexArray:
-    """Complex field on the pixels of the CCD.
+    """Complex field, averaged over each pixel of the CCD.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def mutual_intensity(
     method: str = "auto",
     half_wave_loss: bool = True,
 ) -> ComplexArray:
-    """Mean over each pixel of E_m conj(E_n), for the fields of groups of paths.
+    """Mutual intensity E_m conj(E_n) of groups of paths, averaged over each pixel.
 
     What a camera sees of groups whose phases are stepped by d_m is the sum of J_mn exp(i (d_m - d_n)).
 
@@ -166,7 +166,7 @@ def irradiance(
     method: str = "auto",
     half_wave_loss: bool = True,
 ) -> FloatArray:
-    """Irradiance averaged over each pixel of the CCD.
+    """Irradiance |E|^2, averaged over each pixel of the CCD.
 
     Overlapping sheets add before the square is taken, at as many points of each pixel as their
     fringes ask for: the mean of |E|^2, not the square of the mean field.
@@ -195,7 +195,7 @@ def irradiance(
 
 
 def chosen(paths: Paths, method: str) -> str:
-    """A method, "auto" resolved.
+    """Method of the coherent sum, with "auto" resolved.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def chosen(paths: Paths, method: str) -> str:
 
 
 def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto") -> PixelLight:
-    """The light that paths bring to their CCD, by some method, to be evaluated at a wavelength.
+    """Light of paths on their CCD by a chosen method, to be evaluated at a wavelength.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The Jamin-Lebedeff interferometer: crystal plates part the light into two beams, and join them again."""
+"""Jamin-Lebedeff interferometer: birefringent plates separate two beams and recombine them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from fringetrace.core import FloatArray, nm, unit
 from fringetrace.geometry import plate
 from fringetrace.instruments import layout
-from fringetrace.instruments.arms import Mark
-from fringetrace.instruments.interferometer import Bench
+from fringetrace.instruments.arms import Arms, Mark
+from fringetrace.instruments.interferometer import Interferometer
 from fringetrace.instruments.layout import Sample
 from fringetrace.optics import Element, IncidentRays, Material, Polariser, RealIndex, ShearPlate, wave_plate
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
@@ -42,8 +42,8 @@ def jamin_lebedeff(
     profile: Profile | None = None,
     method: str = "auto",
     design: float = SODIUM,
-) -> Bench:
-    """A Jamin-Lebedeff interferometer: polarised, both beams through the same plates side by side.
+) -> Interferometer:
+    """Jamin-Lebedeff interferometer: two polarised beams side by side through the same plates.
 
     Light along +z, polarised at 45 degrees, meets a shear plate, a half-wave plate (which swaps the two
     polarisations), the sample, a second shear plate like the first, the analyser. The ordinary beam goes
@@ -78,7 +78,7 @@ def jamin_lebedeff(
 
     Returns
     -------
-    Bench
+    Interferometer
         `path_difference` has the optical path that the sample adds.
 
     Raises
@@ -123,9 +123,7 @@ def jamin_lebedeff(
         centre=6.0 * stop * z + moved, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels,
         focus=6.0 * stop + depth - plane,
     )  # fmt: skip
-    return Bench(
-        scene, beam, ccd, reference=0, method=method, mark=Mark(0, branch=2), immersion=scene.medium
-    )  # fmt: skip
+    return Interferometer(scene, beam, ccd, Arms(Mark(0, branch=2), immersion=scene.medium), method)
 
 
 def _in_line(train: dict[str, tuple[float, Element]], stop: float, wide: float) -> tuple[Surface, ...]:

@@ -1,4 +1,4 @@
-"""The Mach-Zehnder interferometer: one arm goes through the sample, once."""
+"""Mach-Zehnder interferometer: one arm passes the sample once."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from fringetrace.core import FloatArray, nm
 from fringetrace.geometry import plate
 from fringetrace.instruments import layout
-from fringetrace.instruments.arms import path_slope
-from fringetrace.instruments.interferometer import Bench
+from fringetrace.instruments.arms import Arms, Mark, path_slope
+from fringetrace.instruments.interferometer import Interferometer
 from fringetrace.instruments.layout import Sample
 from fringetrace.optics import BeamSplitter, Interface, Material, Mirror
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
@@ -37,8 +37,8 @@ def mach_zehnder(
     mirror: Interface = Mirror(),  # noqa: B008 - frozen
     method: str = "auto",
     design: float = DESIGN,
-) -> Bench:
-    """A Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
+) -> Interferometer:
+    """Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
 
     Light goes through the sample along +z; the camera looks back at it, its columns along x and its rows
     along y, focused on a plane inside of the sample: rays are carried back to it along the lines on which
@@ -79,7 +79,7 @@ def mach_zehnder(
 
     Returns
     -------
-    Bench
+    Interferometer
         `path_difference` has the optical path that the sample adds.
 
     Raises
@@ -121,9 +121,8 @@ def mach_zehnder(
     ccd = CCD(
         centre=chip * z, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels, focus=chip - plane,
     )  # fmt: skip
-    return Bench(
-        scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, immersion=scene.medium, sample=1
-    )
+    arms = Arms(Mark(2), reference_tilt, sample=1, immersion=scene.medium)
+    return Interferometer(scene, beam, ccd, arms, method)
 
 
 def _turn(tilt: tuple[float, float]) -> FloatArray:

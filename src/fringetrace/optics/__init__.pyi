@@ -15,7 +15,13 @@ from .elements import (
     IncidentRays as IncidentRays,
     RealIndex as RealIndex,
 )
-from .film_kernels import bare as bare, coated as coated, shares as shares, stacks as stacks
+from .film_kernels import (
+    bare as bare,
+    coated as coated,
+    normal_part as normal_part,
+    shares as shares,
+    stacks as stacks,
+)
 from .films import Film as Film, coefficients as coefficients
 from .interfaces import (
     Absorber as Absorber,

@@ -1,4 +1,4 @@
-"""Plates of uniaxial crystal that split light into two polarised beams: displaced, or deflected.
+"""Birefringent plates: beam displacers (shear, Savart) and Wollaston prisms of uniaxial crystal.
 
 Inside, wave vector and ray differ: phases are those of the wave vector k, places those of the ray S. A plate
 is drawn without its thickness: rays leave, shifted, from the plane in which they arrive, and the optical
@@ -38,7 +38,7 @@ from fringetrace.optics.elements import (
 def refract_extraordinary(
     wave: FloatArray, normal: FloatArray, ordinary: Array, extraordinary: Array, axis: FloatArray
 ) -> tuple[FloatArray, FloatArray, Array]:
-    """The extraordinary wave behind a face, k.eps.k = n_o^2 n_e^2 with k along the face as before it.
+    """Refraction into a uniaxial crystal: extraordinary wave with k.eps.k = n_o^2 n_e^2.
 
     With both indices equal it is the ordinary wave, k.k = n^2.
 
@@ -75,7 +75,7 @@ def refract_extraordinary(
 
 
 def split_field(meeting: IncidentRays, axis: FloatArray, what: str) -> tuple[ComplexArray, ComplexArray]:
-    """Fields along an axis, (3,) or (n, 3), and the rest of them: (n, 3) complex128 each."""
+    """Field components along an axis, (3,) or (n, 3), and the remainder: (n, 3) complex128 each."""
     field = vectors_of(meeting, what)
     seen = transverse_axis(axis, meeting.direction)
     along = scaled(seen, dot(field, seen))
@@ -84,7 +84,7 @@ def split_field(meeting: IncidentRays, axis: FloatArray, what: str) -> tuple[Com
 
 @dataclass(frozen=True, eq=False)
 class ShearPlate:
-    """A plane-parallel plate of uniaxial crystal, a beam displacer: two beams leave it side by side.
+    """Shear plate (beam displacer) of uniaxial crystal: two polarised beams leave it side by side.
 
     The first branch is the ordinary beam, polarised across the optic axis, the second the extraordinary one.
     At normal incidence the ordinary beam goes straight on with the path n_o d, and the extraordinary one is
@@ -126,7 +126,7 @@ class ShearPlate:
         return callable(self.ordinary) or callable(self.extraordinary)
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The ordinary and the extraordinary beam; see `Element`."""
+        """Ordinary and extraordinary branch; see `Element`."""
         n_o = index_at(self.ordinary, meeting.wavelength, "ShearPlate")
         n_e = index_at(self.extraordinary, meeting.wavelength, "ShearPlate")
         extraordinary, ordinary = split_field(meeting, self.axis, "ShearPlate")
@@ -147,7 +147,7 @@ class ShearPlate:
         return Branch(scaled(field, possible), None, meeting.point + shift, path)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> ShearPlate:
-        """The plate turned; as `Mesh.moved`."""
+        """The plate rotated; as `Mesh.moved`."""
         return replace(self, axis=rotate_vector(self.axis, turn))
 
 
@@ -158,7 +158,7 @@ def savart(
     ordinary: RealIndex,
     extraordinary: RealIndex,
 ) -> tuple[ShearPlate, ShearPlate]:
-    """The two plates of a Savart plate: optic axes at 45 degrees to the normal, in planes across each other.
+    """Savart plate: two shear plates, optic axes at 45 degrees to the normal, in perpendicular planes.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def savart(
 
 @dataclass(frozen=True, eq=False)
 class Wollaston:
-    """Two prisms of uniaxial crystal, their optic axes in the plane and across each other: two beams part.
+    """Wollaston prism: two crystal prisms with perpendicular optic axes; the polarisations part in angle.
 
     The prism on the front has its optic axis along `axis`, and grows thicker that way; the one behind
     has it along normal x axis. The first branch is polarised along `axis` (extraordinary in the front
@@ -246,7 +246,7 @@ class Wollaston:
         return callable(self.ordinary) or callable(self.extraordinary)
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The beam polarised along the axis, and the one across; see `Element`."""
+        """Branch polarised along the axis, and the one across; see `Element`."""
         n_o = index_at(self.ordinary, meeting.wavelength, "Wollaston")
         n_e = index_at(self.extraordinary, meeting.wavelength, "Wollaston")
         slope = tangential_axis(self.axis, meeting.normal, "Wollaston axis")
@@ -309,7 +309,7 @@ class Wollaston:
         return meeting.point + tangential(place - offset, ahead), path
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Wollaston:
-        """The prism turned about the origin, then shifted; as `Mesh.moved`."""
+        """The prism rotated about the origin, then shifted; as `Mesh.moved`."""
         return replace(
             self, centre=move_point(self.centre, offset, turn), axis=rotate_vector(self.axis, turn)
         )

@@ -1,4 +1,4 @@
-"""Flat elements of no thickness that a ray goes through: what they are told, and what they answer.
+"""Thin optical elements: flat, without thickness; their protocol, ideal lens and annular stop.
 
 A field here is the square root of a ray's power, so that an element is lossless where it keeps
 |field|^2; how a bundle's cross section changes is in its rays. Fields go as exp(-i w t).
@@ -34,7 +34,7 @@ Waves = Literal["plane", "curved", "torn"]
 
 @dataclass(frozen=True, eq=False)
 class IncidentRays:
-    """Rays that met one element.
+    """Rays that hit an element, one row each.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class IncidentRays:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One of the branches in which rays leave an element; None: unchanged.
+    """Branch in which rays leave an element; None: unchanged.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Branch:
 
 
 class Element(Protocol):
-    """Anything flat that sends rays on in a fixed number of branches.
+    """Protocol of thin elements that send rays on in a fixed number of branches.
 
     `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: plane waves
     leave it plane, curved, or torn (neighbouring rays may fare differently).
@@ -90,43 +90,43 @@ class Element(Protocol):
 
     @property
     def waves(self) -> Waves:
-        """How plane waves leave it."""
+        """Effect on plane waves: they stay plane, get curved, or are torn."""
 
     @property
     def branches(self) -> int:
-        """How many branches there are, always."""
+        """Number of branches, the same for all rays."""
 
     @property
     def polarised(self) -> bool:
-        """Whether fields have to be vectors."""
+        """Whether the element needs fields as vectors."""
 
     @property
     def chromatic(self) -> bool:
-        """Whether rays depend on the wavelength."""
+        """Whether the branches depend on the wavelength."""
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The branches, with a row for each ray."""
+        """Branches of the rays, one row per ray."""
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Element:
-        """The element turned about the origin, then shifted; as `Mesh.moved`."""
+        """The element rotated about the origin, then shifted; as `Mesh.moved`."""
 
 
 def positive_length(value: float, what: str) -> float:
-    """A positive length; ValueError if it is none."""
+    """Checked positive length in metres; else ValueError."""
     if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
         raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
     return float(value)
 
 
 def checked_number(value: float, what: str) -> float:
-    """A finite real number; ValueError if it is none."""
+    """Checked finite real number; else ValueError."""
     if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value)):
         raise ValueError(f"{what}: expected a finite number, got {value!r}")
     return float(value)
 
 
 def checked_index(value: RealIndex, what: str) -> RealIndex:
-    """A refractive index, or the function of the wavelength that gives it; ValueError if it is neither."""
+    """Checked refractive index, or function of the wavelength that gives it; else ValueError."""
     if callable(value):
         return value
     if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
@@ -140,41 +140,41 @@ def index_at(index: RealIndex, wavelength: float | None, what: str) -> float:
 
 
 def required_wavelength(wavelength: float | None, what: str) -> float:
-    """The wavelength, in metres; ValueError if there is none."""
+    """Wavelength of rays in metres; ValueError if it is missing."""
     if wavelength is None:
         raise ValueError(f"{what}: expected a wavelength, which it depends on, got None")
     return wavelength
 
 
 def vectors_of(meeting: IncidentRays, what: str) -> ComplexArray:
-    """The fields, (n, 3) complex128; ValueError if they are no vectors."""
+    """Field vectors of rays, (n, 3) complex128; ValueError if the light is scalar."""
     if meeting.field.ndim != 2:
         raise ValueError(f"{what}: expected polarised light, fields (n, 3), got shape {meeting.field.shape}")
     return meeting.field
 
 
 def move_point(point: FloatArray, offset: npt.ArrayLike, turn: npt.ArrayLike | None) -> FloatArray:
-    """A point (3,) turned about the origin, then shifted."""
+    """Point (3,) rotated about the origin, then shifted."""
     return rotate_vector(point, turn) + checked_vector(offset, "offset")
 
 
 def rotate_vector(vector: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
-    """A vector (3,) turned about the origin."""
+    """Vector (3,) rotated about the origin."""
     return vector if turn is None else np.asarray(checked_rotation(turn, "turn") @ vector, dtype=np.float64)
 
 
 def scaled(rows: Array, factor: Array) -> Array:
-    """Rows, (n,) or (n, 3), times one number each."""
+    """Rows, (n,) or (n, 3), multiplied by one number each."""
     return np.asarray(rows * (factor if rows.ndim == 1 else factor[:, None]))
 
 
 def tangential(vectors: FloatArray, normal: FloatArray) -> FloatArray:
-    """Vectors without their part along unit normals, (n, 3)."""
+    """Tangential part of vectors: without their component along unit normals, (n, 3)."""
     return np.asarray(vectors - scaled(normal, dot(vectors, normal)))
 
 
 def transverse_axis(axis: FloatArray, direction: FloatArray) -> FloatArray:
-    """An axis as rays see it: its part across them, scaled to unit length.
+    """Projection of an axis perpendicular to rays, scaled to unit length.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def transverse_axis(axis: FloatArray, direction: FloatArray) -> FloatArray:
 
 
 def tangential_axis(axis: FloatArray, normal: FloatArray, what: str) -> FloatArray:
-    """An axis as it lies in surfaces, (n, 3) unit; ValueError if it stands on one of them."""
+    """Projection of an axis into surfaces, (n, 3) unit; ValueError if it is normal to one of them."""
     lie = transverse_axis(axis, normal)
     if not lie.any(axis=1).all():
         raise ValueError(f"{what}: expected a direction along the surface, got its normal {axis.tolist()}")
@@ -202,7 +202,7 @@ def tangential_axis(axis: FloatArray, normal: FloatArray, what: str) -> FloatArr
 
 
 def rotate_fields(field: ComplexArray, before: FloatArray, after: FloatArray) -> ComplexArray:
-    """Fields of rays that are bent, turned by the least rotation that takes one direction to the other.
+    """Field vectors of deflected rays, rotated by the least rotation between the directions.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def rotate_fields(field: ComplexArray, before: FloatArray, after: FloatArray) ->
 
 
 def deflect(meeting: IncidentRays, gradient: FloatArray, back: bool) -> tuple[FloatArray, FloatArray]:
-    """Directions behind a path that varies along the surface: n d + its gradient is kept in the plane.
+    """Directions behind a path gradient along the surface: tangential n d grows by the gradient.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ def deflect(meeting: IncidentRays, gradient: FloatArray, back: bool) -> tuple[Fl
 
 
 def onward_fields(meeting: IncidentRays, direction: FloatArray, back: bool) -> ComplexArray:
-    """Fields that go on in new directions; those sent back are turned over as by an ideal mirror, -1."""
+    """Field vectors along new directions; reflected ones are inverted as by an ideal mirror, -1."""
     if not back:
         return rotate_fields(meeting.field, meeting.direction, direction)
     facing = dot(meeting.direction, meeting.normal)
@@ -264,7 +264,7 @@ def onward_fields(meeting: IncidentRays, direction: FloatArray, back: bool) -> C
 
 @dataclass(frozen=True, eq=False)
 class Annulus:
-    """A stop that lets light pass between two radii, and absorbs the rest of what meets it.
+    """Annular stop: transmits between two radii, absorbs the rest.
 
     Parameters
     ----------
@@ -294,19 +294,19 @@ class Annulus:
             raise ValueError(f"Annulus radii: expected 0 <= inner < outer in metres, got {radii}")
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The light between the radii; see `Element`."""
+        """Light between the radii; see `Element`."""
         radius = np.linalg.norm(tangential(meeting.point - self.centre, meeting.normal), axis=1)
         passes = (radius >= self.inner) & (radius <= self.outer)
         return (Branch(scaled(meeting.field, passes)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Annulus:
-        """The stop turned about the origin, then shifted; as `Mesh.moved`."""
+        """The stop rotated about the origin, then shifted; as `Mesh.moved`."""
         return Annulus(move_point(self.centre, offset, turn), self.inner, self.outer)
 
 
 @dataclass(frozen=True, eq=False)
 class IdealLens:
-    """A thin lens without aberrations for one pair of planes.
+    """Ideal thin lens, free of aberrations for one pair of conjugate planes.
 
     Slopes change by offset / focal length, so that each plane across the axis has a sharp image,
     1/s + 1/s' = 1/f. From each point of the plane at the object distance all rays have the same
@@ -354,7 +354,7 @@ class IdealLens:
             raise ValueError(f"IdealLens object distance: expected a length other than 0, got {distance!r}")
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The light bent towards the image; see `Element`."""
+        """Light deflected towards the image; see `Element`."""
         facing = component(meeting.direction, self.axis)
         forward = facing > 0.0
         before = 1.0 / self.object_distance  # vergences, which are 0 for a plane at infinity
@@ -389,6 +389,6 @@ class IdealLens:
         return np.asarray((skew - far * square) / sums[1] - (skew + near * square) / sums[0])
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> IdealLens:
-        """The lens turned about the origin, then shifted; as `Mesh.moved`."""
+        """The lens rotated about the origin, then shifted; as `Mesh.moved`."""
         centre = move_point(self.centre, offset, turn)
         return IdealLens(centre, rotate_vector(self.axis, turn), self.focal_length, self.object_distance)

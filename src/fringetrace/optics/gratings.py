@@ -1,4 +1,4 @@
-"""Gratings: orders of diffraction as branches of rays.
+"""Diffraction gratings: each order is a branch of the rays.
 
 The wave vector along the surface is kept, but for the gradient of the path. Where that leaves more than
 the whole wave vector, the wave is evanescent: the ray is blocked. With `reflects` an element works as one in
@@ -36,7 +36,7 @@ PASSIVE = 1.0 + 1e-12
 
 
 def checked_orders(orders: Any, what: str) -> tuple[int, ...]:
-    """Orders as a tuple; ValueError unless they are different whole numbers."""
+    """Checked diffraction orders as a tuple; ValueError unless they are different whole numbers."""
     listed = tuple(orders) if isinstance(orders, Iterable) else (orders,)
     whole = all(isinstance(m, (int, np.integer)) and not isinstance(m, bool) for m in listed)
     if not (whole and listed and len(set(listed)) == len(listed)):
@@ -60,7 +60,7 @@ def _checked_amplitudes(amplitudes: Any, count: int) -> tuple[complex, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Grating:
-    """A plane grating, which sends light into some of its orders.
+    """Plane diffraction grating that sends light into chosen orders.
 
     In order m the wave vector along the surface changes by m lambda / period along the axis,
     sin theta_m = sin theta_i + m lambda / period in the plane across the grooves, and the path by
@@ -108,11 +108,11 @@ class Grating:
 
     @property
     def branches(self) -> int:
-        """One for each order."""
+        """Number of orders."""
         return len(self.orders)
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The orders; see `Element`."""
+        """One branch per order; see `Element`."""
         assert self.amplitudes is not None
         lie = tangential_axis(self.axis, meeting.normal, "Grating axis")
         along = dot(meeting.point - self.centre, lie)
@@ -123,7 +123,7 @@ class Grating:
         )
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Grating:
-        """The grating turned about the origin, then shifted; as `Mesh.moved`."""
+        """The grating rotated about the origin, then shifted; as `Mesh.moved`."""
         centre = move_point(np.asarray(self.centre), offset, turn)
         return replace(self, axis=rotate_vector(self.axis, turn), centre=centre)
 
@@ -131,7 +131,7 @@ class Grating:
 def diffracted_branch(
     meeting: IncidentRays, gradient: FloatArray, path: FloatArray, amplitude: complex, reflects: bool
 ) -> Branch:
-    """The branch behind a path and its gradient (n, 3), times an amplitude."""
+    """Branch behind an added path with its gradient (n, 3), multiplied by an amplitude."""
     direction, possible = deflect(meeting, gradient, reflects)
     return Branch(
         scaled(amplitude * onward_fields(meeting, direction, reflects), possible), direction, None, path
@@ -139,7 +139,7 @@ def diffracted_branch(
 
 
 def lamellar(orders: Iterable[int], phase: float, fill: float = 0.5) -> tuple[complex, ...]:
-    """Amplitudes of a binary phase grating: exp(i phase) on the middle part of each period, 1 elsewhere.
+    """Order amplitudes of a binary phase grating: exp(i phase) on the middle of each period, 1 elsewhere.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def lamellar(orders: Iterable[int], phase: float, fill: float = 0.5) -> tuple[co
 
 
 def sinusoidal(orders: Iterable[int], phase: float) -> tuple[complex, ...]:
-    """Amplitudes i^m J_m(phase) of a phase grating exp(i phase cos(2 pi x / period)).
+    """Order amplitudes i^m J_m(phase) of a phase grating exp(i phase cos(2 pi x / period)).
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def sinusoidal(orders: Iterable[int], phase: float) -> tuple[complex, ...]:
 
 
 def blazed_amplitude(order: int, waves: float) -> complex:
-    """Amplitude of an order of a blazed grating that is so many waves deep.
+    """Order amplitude of a blazed grating of a given depth in waves.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Phase plates: a map of optical path over a plane; spatial light modulators, zone plates.
+"""Phase plates: a map of optical path over a plane; spatial light modulators and zone plates.
 
 Rays get the path at the point where they meet the plate, whatever their angle, and are bent by its gradient
 as by a grating of that period.
@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, frame
+from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, filled, frame
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -37,7 +37,7 @@ LEAST = 4  # samples that a cubic spline takes, each way
 
 @dataclass(frozen=True, eq=False)
 class FormulaRelief:
-    """A map given as a function, its gradient too, or else differenced over a step (fourth order)."""
+    """Optical path map by a function, with its gradient or a finite-difference step (fourth order)."""
 
     opd: Map
     gradient: Slopes | None
@@ -55,7 +55,7 @@ class FormulaRelief:
 
 @dataclass(frozen=True, eq=False)
 class PixelRelief:
-    """A map of flat square pixels, [row, column] = [y, x]; beyond them the nearest goes on."""
+    """Optical path map of flat square pixels, [row, column] = [y, x], extended by the nearest pixel."""
 
     samples: FloatArray
     pitch: float
@@ -73,14 +73,14 @@ class PixelRelief:
 
 @dataclass(frozen=True, eq=False)
 class SplineRelief:
-    """A bicubic spline through samples at the centres of pixels, which goes on beyond them."""
+    """Optical path map by a bicubic spline through samples at pixel centres."""
 
     samples: FloatArray
     pitch: float
 
     @cached_property
     def fit(self) -> Any:
-        """The spline, of (y, x) in metres from the centre."""
+        """Bicubic spline over (y, x) in metres from the centre."""
         from scipy.interpolate import NdBSpline, make_interp_spline
 
         y, x = ((np.arange(n) - 0.5 * (n - 1)) * self.pitch for n in self.samples.shape)
@@ -100,7 +100,7 @@ class SplineRelief:
 
 @dataclass(frozen=True, eq=False)
 class PhasePlate:
-    """A map of optical path over a plane: aberration, spatial light modulator, diffractive element.
+    """Phase plate: a map of optical path over a plane (aberration, modulator, diffractive element).
 
     What the plate does to the whole wave, such as the orders that the pixels of a modulator send out,
     takes a diffraction integral, and is not in the rays.
@@ -174,7 +174,7 @@ class PhasePlate:
             if (pitch is None) == (self.gradient is None):
                 raise ValueError("PhasePlate: expected either a gradient or a pitch beside a function")
             return FormulaRelief(self.opd, self.gradient, pitch)
-        samples = np.array(self.opd, dtype=np.float64)
+        samples = filled(self.opd).copy()
         if samples.ndim != 2 or not samples.size or not np.isfinite(samples).all():
             raise ValueError(f"PhasePlate opd: expected a table of finite metres, got shape {samples.shape}")
         if pitch is None or self.gradient is not None:
@@ -192,16 +192,16 @@ class PhasePlate:
 
     @property
     def waves(self) -> Waves:
-        """Plane waves leave pixels torn, smooth maps curved."""
+        """Effect on plane waves: pixels tear them, smooth maps curve them."""
         return "torn" if isinstance(self.relief, PixelRelief) else "curved"
 
     @property
     def branches(self) -> int:
-        """One for each order."""
+        """Number of orders."""
         return len(self.orders)
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The light with its path changed, and bent; see `Element`."""
+        """Light with its path changed, deflected by the gradient; see `Element`."""
         offset = meeting.point - self.centre
         path, east, north = self.relief(component(offset, self.right), component(offset, self.up))
         if isinstance(self.relief, PixelRelief) and not self.reflects:
@@ -218,7 +218,7 @@ class PhasePlate:
         )
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> PhasePlate:
-        """The plate turned about the origin, then shifted; as `Mesh.moved`."""
+        """The plate rotated about the origin, then shifted; as `Mesh.moved`."""
         centre = move_point(self.centre, offset, turn)
         return replace(
             self, centre=centre, right=rotate_vector(self.right, turn), up=rotate_vector(self.up, turn)
@@ -235,7 +235,7 @@ def _plane_axes(right: npt.ArrayLike, up: npt.ArrayLike) -> tuple[FloatArray, Fl
 
 @dataclass(frozen=True)
 class Focusing:
-    """Path over a plane that makes the spherical wave from one point of its axis into that to another.
+    """Optical path map that turns the spherical wave from one axial point into that to another.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ class Focusing:
 
     @property
     def distances(self) -> tuple[float, ...]:
-        """Object and image distance, metres, those that are finite."""
+        """Object and image distance in metres, those that are finite."""
         vergences = 1.0 / self.object_distance, 1.0 / self.focal_length - 1.0 / self.object_distance
         return tuple(1.0 / vergence for vergence in vergences if vergence != 0.0)
 
@@ -263,7 +263,7 @@ class Focusing:
         return self.index * path
 
     def slopes(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives by x and y."""
+        """Derivatives of the path along x and y."""
         square = x * x + y * y
         slope = np.zeros_like(square)
         for s in self.distances:
@@ -281,7 +281,7 @@ def zone_plate(
     index: float = 1.0,
     reflects: bool = False,
 ) -> PhasePlate:
-    """A phase plate that images one point of its axis exactly onto another.
+    """Zone plate: a phase plate that images one axial point exactly onto another.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Elements that act on polarisation: polariser, retarder, and any Jones matrix.
+"""Polarising elements: polariser, retarder and Jones matrices.
 
 The retarder's sign is fixed here: the component along its axis goes as exp(+i retardance), the one across
 as 1. With fields exp(-i w t) a positive retardance delays it: the axis is the slow one, as the optic axis
@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot
+from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, filled
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -37,7 +37,7 @@ PASSIVE = 1.0 + 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Polariser:
-    """Lets the component along its axis pass, and absorbs the one across.
+    """Linear polariser: transmits the component along its axis, absorbs the one across.
 
     Parameters
     ----------
@@ -66,17 +66,17 @@ class Polariser:
             raise ValueError(f"Polariser extinction: expected a number from 0 to 1, got {self.extinction!r}")
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The component along the axis; see `Element`."""
+        """Component along the axis; see `Element`."""
         return (Branch(scale_components(meeting, "Polariser", self.axis, 1.0, self.extinction**0.5)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Polariser:
-        """The polariser turned; as `Mesh.moved`."""
+        """The polariser rotated; as `Mesh.moved`."""
         return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 @dataclass(frozen=True, eq=False)
 class Retarder:
-    """Delays the component along its axis against the one across.
+    """Retarder: delays the component along its axis relative to the one across.
 
     Parameters
     ----------
@@ -142,18 +142,18 @@ class Retarder:
         )
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """Both components, one of them delayed; see `Element`."""
+        """Both components, one delayed; see `Element`."""
         delay = complex(np.exp(1j * self.at(meeting.wavelength)))
         return (Branch(scale_components(meeting, "Retarder", self.axis, delay, 1.0)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Retarder:
-        """The retarder turned; as `Mesh.moved`."""
+        """The retarder rotated; as `Mesh.moved`."""
         return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 @dataclass(frozen=True)
 class Birefringence:
-    """Retardance of a crystal plate, 2 pi (n_e - n_o) thickness / wavelength: a function of the wavelength.
+    """Retardance of a crystal plate over the wavelength, 2 pi (n_e - n_o) thickness / wavelength.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ class Birefringence:
 
 
 def wave_plate(axis: npt.ArrayLike, waves: float, design: float | None = None) -> Retarder:
-    """A retarder by waves: 1/2 half-wave, 1/4 quarter-wave, 10.25 a quarter-wave plate of tenth order.
+    """Wave plate: retarder by waves; 1/2 half-wave, 1/4 quarter-wave, 10.25 quarter-wave of tenth order.
 
     Parameters
     ----------
@@ -203,7 +203,7 @@ def wave_plate(axis: npt.ArrayLike, waves: float, design: float | None = None) -
 
 @dataclass(frozen=True, eq=False)
 class JonesPlate:
-    """Any linear action on the two components of a field that absorbs or keeps power.
+    """Jones matrix element: any passive linear action on the two field components.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ class JonesPlate:
         object.__setattr__(self, "axis", checked_direction(self.axis, "JonesPlate axis"))
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The field times the matrix; see `Element`."""
+        """Field times the matrix; see `Element`."""
         field = vectors_of(meeting, "JonesPlate")
         behind = dot(meeting.direction, meeting.normal) > 0.0
         first = transverse_axis(self.axis, meeting.direction)
@@ -243,13 +243,13 @@ class JonesPlate:
         return (Branch(scaled(first, m[0, 0] * a + upper * b) + scaled(second, lower * a + m[1, 1] * b)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> JonesPlate:
-        """The plate turned; as `Mesh.moved`."""
+        """The plate rotated; as `Mesh.moved`."""
         return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 def _checked_matrix(value: Any) -> ComplexArray:
     try:
-        matrix = np.array(value, dtype=np.complex128)
+        matrix = filled(value, np.complex128).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"JonesPlate matrix: expected 2 x 2 complex numbers, got {value!r}") from error
     if matrix.shape != (2, 2) or not np.isfinite(matrix).all():
@@ -263,7 +263,7 @@ def _checked_matrix(value: Any) -> ComplexArray:
 def scale_components(
     meeting: IncidentRays, what: str, axis: FloatArray, along: complex, rest: complex
 ) -> ComplexArray:
-    """Fields with their component along an axis times one number, and the rest times another."""
+    """Fields with the component along an axis multiplied by one number, the rest by another."""
     field = vectors_of(meeting, what)
     seen = transverse_axis(axis, meeting.direction)
     return np.asarray(rest * field + scaled(seen, (along - rest) * dot(field, seen)))

@@ -1,4 +1,4 @@
-"""The numerical aperture of an objective: which directions get through, wherever rays cross its plane."""
+"""Pupil of an objective: the numerical aperture limits ray directions, wherever rays cross its plane."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fringetrace.optics.elements import (
 
 @dataclass(frozen=True, eq=False)
 class Pupil:
-    """Lets rays pass whose direction is within a numerical aperture, and absorbs the rest.
+    """Pupil: transmits rays within a numerical aperture, absorbs the rest.
 
     Parameters
     ----------
@@ -52,11 +52,11 @@ class Pupil:
             raise ValueError(f"Pupil aperture: expected a positive number, got {self.aperture!r}")
 
     def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
-        """The light within the aperture; see `Element`."""
+        """Light within the aperture; see `Element`."""
         aside = tangential(meeting.direction, np.broadcast_to(self.axis, meeting.direction.shape))
         passes = meeting.index**2 * dot(aside, aside) <= self.aperture**2
         return (Branch(scaled(meeting.field, passes)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Pupil:
-        """The pupil turned; as `Mesh.moved`."""
+        """The pupil rotated; as `Mesh.moved`."""
         return replace(self, axis=rotate_vector(self.axis, turn))

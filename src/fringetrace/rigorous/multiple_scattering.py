@@ -1,4 +1,4 @@
-"""Multiple scattering of many cylinders: what all others send to each, solved for."""
+"""Multiple scattering between many cylinders: the linear system of exciting amplitudes."""
 
 from __future__ import annotations
 

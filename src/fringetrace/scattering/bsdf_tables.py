@@ -1,4 +1,4 @@
-"""Tables of BRDFs: values between the entries, a sphere under one light, and files for renderers."""
+"""BSDF tables: interpolation, a sphere under one light, and Mitsuba files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def brdf_table(
     phi_o: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
 ) -> DataArray:
-    """A BRDF f = dL_o / (L_i cos(theta_i) dOmega_i) with its axes.
+    """BRDF table f = dL_o / (L_i cos(theta_i) dOmega_i) with its axes.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def _between(at: FloatArray, nodes: FloatArray) -> tuple[npt.NDArray[np.intp], F
 
 
 def lookup(brdf: DataArray, incident: npt.ArrayLike, outgoing: npt.ArrayLike) -> FloatArray:
-    """A tabulated BRDF between any two directions: linear in each angle, around the turn too.
+    """BRDF between the entries of a table: linear in each angle, periodic in azimuth.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def lookup(brdf: DataArray, incident: npt.ArrayLike, outgoing: npt.ArrayLike) ->
 
 
 def shaded_sphere(brdf: DataArray, light: npt.ArrayLike = (0.0, 0.0, 1.0), pixels: int = 256) -> FloatArray:
-    """A sphere under one distant light, seen from far away along z: radiance over irradiance.
+    """Sphere with a BRDF under one distant light, seen along z: radiance over irradiance.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def mitsuba(
     incidences: tuple[int, int] = (19, 37),
     name: str = "fringetrace",
 ) -> None:
-    """A file for the BSDF `measured` of Mitsuba 3, in its spectral variants.
+    """Write a BRDF for Mitsuba 3's plugin `measured` (spectral variants).
 
     That stores f cos(theta_o) against the half vector between light and eye, on a square of
     sqrt(theta_m) and phi_m (Dupuy and Jakob, ACM Trans. Graph. 37, 274 (2018)), with maps that say

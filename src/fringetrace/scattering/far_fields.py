@@ -1,4 +1,4 @@
-"""What leaves a sample that is lit from one direction: rays traced once, and summed at a detector."""
+"""Far field of a sample lit from one direction: one trace, summed at a detector."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ CHUNK = 2**17
 
 @dataclass(frozen=True, eq=False)
 class Far:
-    """What left a sample that was lit from one direction.
+    """Far field of a sample lit from one direction.
 
     Attributes
     ----------
@@ -107,12 +107,12 @@ class _Adding:
 
 
 def parts(source: Beam | Rays) -> int:
-    """How many amplitudes light has: one, or those of s and p."""
+    """Number of field components: one for scalar light, two (s and p) for polarised light."""
     return 1 if source.polarisation is None else 2
 
 
 def mean(fars: Sequence[Far]) -> Far:
-    """Light of several states that do not interfere: the mean of what left.
+    """Mean far field of mutually incoherent states of light.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def far_field(
     tolerance: float = TOLERANCE,
     threads: int | None = None,
 ) -> Far:
-    """Trace one incidence, and sum what arrives at a detector.
+    """Far field of one incidence: trace the sample once, sum the paths at a detector.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""BRDF: light from one direction goes into another, at any wavelengths; one trace an incidence."""
+"""BRDF of a sample over angles and wavelengths, from one trace per incidence."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def amplitudes(
     polarisation: Polarisation = None,
     **options: Any,
 ) -> DataArray:
-    """Complex sums of what goes from each direction into each: the BRDF before it is squared.
+    """Complex far-field amplitudes from each direction into each: the BRDF before squaring.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def brdf(
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> DataArray:
-    """Bidirectional reflectance distribution function, radiance over incident irradiance.
+    """Bidirectional reflectance distribution function (BRDF), radiance over incident irradiance.
 
     One trace an incidence serves all directions and all wavelengths; where media are dispersive, absorb,
     or have films, it is one trace a wavelength. Light that meets nothing is left
@@ -306,7 +306,7 @@ def _check_same(theta: FloatArray, phi: FloatArray, detector: Detector) -> None:
 
 
 def reciprocity(table: DataArray) -> float:
-    """How far a BRDF is from f(i, o) = f(o, i) (Helmholtz), as a part of its largest value.
+    """Reciprocity error of a BRDF: deviation from f(i, o) = f(o, i), relative to its maximum.
 
     It holds for whole samples, lit to beyond their edges, and for parts of even ones; not for pixels
     at a finite distance, nor for what rays miss between them.
@@ -336,7 +336,7 @@ def reciprocity(table: DataArray) -> float:
 
 
 def brdf_sampling_error(table: DataArray, scene: Scene, detector: Detector, **options: Any) -> float:
-    """How far a BRDF changes if half the rays are taken either way, at the middle one of its incidences.
+    """Sampling error of a BRDF: relative change with half the rays either way, at its middle incidence.
 
     An estimate of what the table is off, where rays are many enough that twice as many change it less.
 
@@ -364,7 +364,7 @@ def brdf_sampling_error(table: DataArray, scene: Scene, detector: Detector, **op
 
 
 def rounding_error(scene: Scene, theta: float, wavelength: float, **options: Any) -> float:
-    """What rounding in float64 costs the light that leaves a sample, see `budget.hit_error`.
+    """Rounding error of the optical paths of light that leaves a sample, in waves; see `hit_error`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Lattices of rods, ordered and disordered, and how their BRDF changes with their parameters."""
+"""Parameter studies of rod lattices: BRDF by rays, by multiple scattering, and as a multilayer."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def cluster(
     wavelengths: npt.ArrayLike,
     polarisation: Polarised = "E",
 ) -> FloatArray:
-    """BRDF of a lattice in the plane across its rods, by rigorous multiple scattering.
+    """BRDF of a finite lattice in the plane across its rods, by rigorous multiple scattering.
 
     f = (length / wavelength) (d sigma / d theta) / (width cos theta_i cos theta_o): rods of a length of
     many waves send d sigma / d theta into a lobe that is wavelength / length wide along them, and its
@@ -122,7 +122,7 @@ def specular(
     method: str = "rods",
     polarisation: Polarised = "unpolarised",
 ) -> DataArray:
-    """What a lattice of rows that never end reflects, rigorously or as a multilayer.
+    """Specular reflectance of a lattice with infinite rows, rigorously or as a multilayer.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def specular(
 
 
 def validity_attributes(kinds: Sequence[RodLattice], waves: FloatArray) -> dict[str, float | str]:
-    """What rays are worth on the smallest of some rods, at the longest of some wavelengths: attributes."""
+    """Validity attributes for the smallest of some rods at the longest of some wavelengths."""
     return min((kind.validity(waves.max()) for kind in kinds), key=lambda v: v.size_parameter).attributes
 
 
@@ -202,7 +202,7 @@ def study(
     folder: str | os.PathLike[str] | None = None,
     **sweeping: Any,
 ) -> DataArray:
-    """BRDF of many lattices in the plane across their rods.
+    """BRDF of lattices over combinations of parameters, in the plane across their rods.
 
     Parameters
     ----------

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from fringetrace.core import ROUNDED, ComplexArray, FloatArray, checked_direction, checked_vector, frame
-from fringetrace.scene.planes import Axes, checked_grid, checked_positive, checked_size
-
-if TYPE_CHECKING:
-    pass
+from fringetrace.core import (
+    ROUNDED,
+    ComplexArray,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    filled,
+    frame,
+)
+from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive, checked_size
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Gaussian beam profile, brightest at the centre: amplitude exp(-r^2 / waist^2).
+    """Gaussian beam profile: amplitude exp(-r^2 / waist^2).
 
     Parameters
     ----------
@@ -44,7 +49,7 @@ Profile = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Names of surfaces, given as one or as several.
+    """Tuple of surface names, from one name or several.
 
     Parameters
     ----------
@@ -59,7 +64,7 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
 
 def _checked_jones(value: Any) -> ComplexArray:
     try:
-        vector = np.array(value, dtype=np.complex128)
+        vector: ComplexArray = filled(value, np.complex128).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
     size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
@@ -70,7 +75,7 @@ def _checked_jones(value: Any) -> ComplexArray:
 
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """A collimated coherent beam: a plane wave, launched as a grid of parallel rays.
+    """Collimated coherent beam: a plane wave, launched as a grid of parallel rays.
 
     Parameters
     ----------
@@ -106,7 +111,7 @@ class Beam:
     profile: Profile | None = None
     passes: tuple[str, ...] = ()
     polarisation: ComplexArray | None = None
-    axes: Axes = field(init=False, repr=False)  # of columns, rows, and the direction
+    axes: PlaneAxes = field(init=False, repr=False)  # of columns, rows, and the direction
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Beam centre"))
@@ -123,5 +128,5 @@ class Beam:
 
     @property
     def area(self) -> float:
-        """Area of the beam that one ray stands for, m^2."""
+        """Beam area per ray, m^2."""
         return self.size[0] * self.size[1] / (self.shape[0] * self.shape[1])

@@ -1,4 +1,4 @@
-"""Scene files: a scene or a bench, its light and what is wanted of it, as TOML."""
+"""Scene files: a scene or an interferometer, its light and the wanted outputs, as TOML."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ FREE = ("surface", "beam", "ccd", "medium", "method", "max_bounces", "min_amplit
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """What a scene file says.
+    """Contents of a scene file: scene or interferometer, beams, CCD, wavelengths, outputs.
 
     Parameters
     ----------
@@ -96,14 +96,14 @@ class Experiment:
 
     @cached_property
     def scene(self) -> Scene:
-        """The surfaces and what is around them."""
+        """Scene: the surfaces and the surrounding medium."""
         return Scene(self.surface, self.medium) if self.bench is None else self.bench.bench.scene
 
 
 def parse_experiment(
     text: str, name: str, folder: str | os.PathLike[str], *, allow_outside: bool = False
 ) -> Experiment:
-    """A scene file's text, checked.
+    """Parse and check the text of a scene file.
 
     Parameters
     ----------
@@ -131,7 +131,7 @@ def parse_experiment(
 
 
 def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Experiment:
-    """A scene or a bench from a TOML file. No code runs from it.
+    """Load a scene or an interferometer from a TOML file; runs no code from it.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Experi
 
 
 def save(what: Experiment | Scene, path: str | os.PathLike[str], *, allow_outside: bool = False) -> None:
-    """Write a scene file, which gives the same again, to the last bit.
+    """Save a scene file; loading it gives the same setup, to the last bit.
 
     Meshes that were loaded from a file in the same folder are referred to; others, and large arrays, are
     written beside it. All files are there in full or not at all.

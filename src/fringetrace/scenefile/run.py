@@ -1,4 +1,4 @@
-"""A scene file run: traced, recorded, judged, and its outputs written."""
+"""Run of a scene file: trace, record, check, write the outputs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fringetrace.accuracy import checks
 from fringetrace.core import Array, ComplexArray, FloatArray, FringetraceWarning, nm, staged, tables
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.geometry import write_height_map
-from fringetrace.instruments import Bench, Mark, records, tiff
+from fringetrace.instruments import Interferometer, Mark, records, tiff
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.scenefile.files import Experiment
 from fringetrace.tracing import Fate, Ledger, Paths, needs, trace
@@ -29,7 +29,7 @@ BLIND = ("paths.nc", "scene.png")
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """An experiment, and its light as far as it was asked for.
+    """A setup with its lazily computed paths, images and fields.
 
     Parameters
     ----------
@@ -40,35 +40,35 @@ class Run:
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     def kept(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """What is made once."""
+        """Value computed once and kept."""
         if key not in self.derived:
             self.derived[key] = make()
         return self.derived[key]
 
     @property
-    def bench(self) -> Bench | None:
-        """The ready bench, if it is one."""
+    def bench(self) -> Interferometer | None:
+        """The interferometer, if the setup is one."""
         return None if self.experiment.bench is None else self.experiment.bench.bench
 
     @property
     def ccd(self) -> CCD:
-        """What records the light."""
+        """CCD that records the light."""
         found = self.experiment.ccd if self.bench is None else self.bench.ccd
         assert found is not None
         return found
 
     @property
     def beams(self) -> tuple[Beam, ...]:
-        """What lights the scene."""
+        """Beams that light the scene."""
         return self.experiment.beam if self.bench is None else (self.bench.beam,)
 
     @property
     def method(self) -> str:
-        """How arrivals become light on the pixels."""
+        """Method of the coherent sum on the pixels."""
         return self.experiment.method if self.bench is None else self.bench.method
 
     def paths(self, wavelength: float) -> list[Paths]:
-        """The paths of each beam; traced anew where the scene depends on the wavelength."""
+        """Paths of each beam, traced per wavelength where the scene depends on it."""
         if self.bench is not None:
             self.image(wavelength)
             return [self.bench.trace()]
@@ -79,14 +79,14 @@ class Run:
         return found
 
     def traced(self, beam: Beam, ccd: CCD | None, wavelength: float | None, record: bool = False) -> Paths:
-        """A beam through the scene."""
+        """Trace one beam through the scene."""
         return trace(
             self.experiment.scene, beam, ccd, wavelength=wavelength, max_bounces=self.experiment.max_bounces,
             min_amplitude=self.experiment.min_amplitude, record=record,
         )  # fmt: skip
 
     def image(self, wavelength: float) -> FloatArray:
-        """(rows, columns), |E|^2."""
+        """Irradiance |E|^2, (rows, columns)."""
 
         def find() -> FloatArray:
             if self.bench is None:
@@ -99,14 +99,14 @@ class Run:
         return found
 
     def field(self, wavelength: float) -> ComplexArray:
-        """(rows, columns) complex128, or (3, rows, columns) of light with a polarisation."""
+        """Complex field, (rows, columns) complex128, or (3, rows, columns) for polarised light."""
         if self.bench is not None:
             return self.bench.field(wavelength)
         return complex_field(self.paths(wavelength), wavelength, self.method)
 
 
 def run(experiment: Experiment, out: Path) -> Iterator[tuple[str, str]]:
-    """Trace an experiment and write what it asks for; all files appear at the end, or none.
+    """Trace a setup and write its outputs, all of them or none.
 
     Parameters
     ----------
@@ -319,7 +319,7 @@ def _paths_nc(current: Run, folder: Path) -> None:
 def scene_to_draw(
     experiment: Experiment, wavelength: float | None, rays: int
 ) -> tuple[Scene, list[Paths], FloatArray | None, Mark | None]:
-    """An experiment to be looked at.
+    """Scene, paths and drawing options of a setup, for a view.
 
     Parameters
     ----------
@@ -344,7 +344,7 @@ def scene_to_draw(
     beams = [replace(beam, shape=few(beam.shape, rays)) for beam in current.beams]
     paths = [current.traced(beam, ccd, wavelength, record=True) for beam in beams]
     image = None if ccd is None or wavelength is None or not beams else current.image(wavelength)
-    reference = None if bench is None else bench.mark or Mark(bench.reference)
+    reference = None if bench is None else bench.arms.reference
     return experiment.scene, paths, image, reference
 
 

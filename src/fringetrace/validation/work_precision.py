@@ -1,4 +1,4 @@
-"""Run time against error: methods run on scenes whose truth is known; a table, a picture, a JSON file."""
+"""Work-precision benchmark: run time against error on reference scenes; table, figure and JSON."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Tracer = Callable[[Scene, Beam, CCD], Paths]
 
 @dataclass(frozen=True)
 class Method:
-    """A way from a scene to the field on its pixels.
+    """Method from a scene to the field on its pixels.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Method:
     quick: tuple[int, ...]
 
     def suits(self, standard: Standard) -> bool:
-        """Whether there is anything to run: flat facets are their own form."""
+        """Whether the method applies: flat facets need no form."""
         return standard.curved or not self.form
 
 
@@ -71,7 +71,7 @@ METHODS = (
 
 @dataclass(frozen=True)
 class Size:
-    """How large a bench is: pixels and cells of the meshes along either side, and how often each run."""
+    """Size of the benchmark: pixels, mesh cells along either side, repetitions."""
 
     pixels: int
     cells: int
@@ -85,7 +85,7 @@ LONG = 0.5
 
 @dataclass(frozen=True)
 class StandardRun:
-    """One run of a method on a standard.
+    """One run of a method on a reference scene.
 
     Attributes
     ----------
@@ -111,7 +111,7 @@ class StandardRun:
 
 
 def phase_error(field: ComplexArray, truth: ComplexArray) -> float:
-    """Phase error in waves, rms over pixels, each weighted with its power.
+    """Phase error in waves, rms over pixels weighted with their power.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def phase_error(field: ComplexArray, truth: ComplexArray) -> float:
 
 
 def irradiance_error(image: FloatArray, truth: FloatArray) -> float:
-    """Root of the mean square of the difference, relative to the mean.
+    """Irradiance error, rms over pixels, relative to the mean.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def irradiance_error(image: FloatArray, truth: FloatArray) -> float:
 def run_standard(
     standard: Standard, truth: Truth, method: Method, count: int, repeats: int = 1
 ) -> StandardRun:
-    """Run a method on a standard.
+    """Run a method on a reference scene.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def runs(
     quick: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Iterator[StandardRun]:
-    """All methods on some standards, with more and more rays.
+    """Run all methods on reference scenes, with increasing numbers of rays.
 
     Facets that only stand for a smooth surface grow with the rays where the wavefront method is to
     follow them, two rays a facet along either side; the ray sum has them fine from the start.
@@ -236,7 +236,7 @@ def runs(
 
 
 def checked_standards(names: Iterable[str]) -> tuple[str, ...]:
-    """Names of standards, once they are known to be some.
+    """Checked names of reference scenes.
 
     Parameters
     ----------
@@ -259,7 +259,7 @@ def checked_standards(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def best(done: Iterable[StandardRun]) -> list[StandardRun]:
-    """The most exact run of each method on each standard, in their order.
+    """Most accurate run of each method on each scene, in their order.
 
     Parameters
     ----------
@@ -278,7 +278,7 @@ def best(done: Iterable[StandardRun]) -> list[StandardRun]:
 
 
 def markdown_table(done: Iterable[StandardRun]) -> str:
-    """The most exact run of each method on each standard, as a Markdown table.
+    """Markdown table of the most accurate run of each method on each scene.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def markdown_table(done: Iterable[StandardRun]) -> str:
 
 
 def machine() -> dict[str, str | int | None]:
-    """What the bench ran on: processor, system, and versions of what decides the time.
+    """Description of the machine: processor, system, versions of the libraries that decide run time.
 
     Returns
     -------
@@ -315,7 +315,7 @@ def machine() -> dict[str, str | int | None]:
 
 
 def write(done: Iterable[StandardRun], folder: Path) -> None:
-    """All runs with machine and versions as `work_precision.json`, and a picture of them.
+    """Write all runs as `work_precision.json`, and a figure of them.
 
     Parameters
     ----------
@@ -330,7 +330,7 @@ def write(done: Iterable[StandardRun], folder: Path) -> None:
 
 
 def panels(done: Iterable[StandardRun]) -> dict[str, dict[str, FloatArray]]:
-    """Runs as `views.comparison` draws them.
+    """Panels of the runs for `views.comparison`.
 
     Parameters
     ----------

@@ -102,7 +102,7 @@ def test_parts_of_the_paths_bring_their_part_of_the_light():
         shapes.step(9 * mm, 9 * mm, 0.4 * mm, 80 * nm), aperture=3 * mm, pixels=(8, 9)
     )
     paths = bench.trace().detected
-    visits = paths.visits(bench.reference)
+    visits = paths.visits(bench.arms.reference.surface)
     parts = [ft.complex_field(paths.where(visits == n), HENE, "wavefront") for n in (0, 1)]
     assert abs(parts[1]) == pytest.approx(np.full((8, 9), 0.5), abs=1e-9)
     whole = ft.complex_field(paths, HENE, "wavefront")

@@ -1,4 +1,4 @@
-"""Curved sheets of traced beams: patches between the nodes, and at edges patches fitted to rays inside."""
+"""Curved wavefronts: patches between grid nodes, and patches fitted to rays at edges."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ STENCIL = 5
 
 
 def curved(survey: Survey) -> tuple[list[PatchCells], FloatArray]:
-    """Sheets that met surfaces with a form, cut along their edges.
+    """Curved wavefronts off surfaces with a form, cut along their edges.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Edges of a scene's meshes, and from where on the beam light comes by them."""
+"""Feature edges of meshes (rims, creases, silhouettes), and where the beam passes them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Creases:
-    """Edges of meshes where light may part.
+    """Edges of meshes where light may be split.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Creases:
     normals: FloatArray
 
     def seen_along(self, direction: FloatArray) -> FloatArray:
-        """Ends (m, 2, 3) of those that part light of a direction (3,)."""
+        """End points (m, 2, 3) of the edges that split light of a direction (3,)."""
         facing = self.normals @ direction
         with np.errstate(invalid="ignore"):
             through = facing[:, 0] * facing[:, 1] > 0.0
@@ -57,7 +57,7 @@ class Creases:
 
 
 def creases(scene: Scene) -> Creases:
-    """Rims, edges between facets of different planes, and all edges within forms.
+    """Feature edges: rims, edges between facets of different planes, and all edges within forms.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _of(surface: Surface, part: npt.NDArray[np.int64]) -> Creases:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """Legs of node rays that met the same surfaces so far: straight lines on the beam's grid.
+    """Segments of node rays that met the same surfaces so far: straight lines over the beam's grid.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Leg:
     steps: FloatArray
 
     def nearest(self, points: FloatArray) -> tuple[FloatArray, Mask, Mask]:
-        """Where on the beam's grid the light starts that comes by points, by linear steps between nodes.
+        """Point of the beam's grid whose light passes given points, interpolated between nodes.
 
         Parameters
         ----------
@@ -172,7 +172,7 @@ def _solved(slope: FloatArray, miss: FloatArray) -> FloatArray:
 
 
 def segments_near_edges(paths: Paths, shape: tuple[int, int]) -> Iterator[tuple[Leg, FloatArray]]:
-    """Legs of rays from the nodes of a beam's grid, and the edges of meshes that are near them.
+    """Segments of the rays from a beam's grid nodes, with the mesh edges near them.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ def _leg(lines: FloatArray, ray: Array, wide: int, every: Array) -> Leg | None:
 
 
 def places_beside_edges(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, Mask]:
-    """Places on a beam's grid from which light comes by the edges of meshes, on either side of them.
+    """Points on the beam's grid from which light passes mesh edges, on either side.
 
     Found from the legs of the rays from the nodes: exactly where these are parallel, else to second
     order in the spacing of the nodes.

@@ -1,4 +1,4 @@
-"""Patches of a curved sheet fitted to rays: from places in the lit parts of cells to coefficients."""
+"""Least-squares fit of wavefront patches to rays in the lit parts of cells."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CHUNK = 1024
 
 @dataclass(frozen=True, eq=False)
 class PatchFit:
-    """Patches of a sheet and the pieces of cells that they are meant for.
+    """Fitted patches of a wavefront, and the pieces of cells that they cover.
 
     Attributes
     ----------
@@ -58,32 +58,32 @@ class PatchFit:
     high: FloatArray
 
     def local(self, at: FloatArray, owner: Array) -> FloatArray:
-        """Points (n, ..., 2) of the beam's grid on their patches."""
+        """Patch coordinates of points (n, ..., 2) of the beam's grid."""
         spread = (len(at), *[1] * (at.ndim - 2), 2)
         low, high = (corner[owner].reshape(spread) for corner in (self.low, self.high))
         return np.asarray((at - low) / (high - low), dtype=np.float64)
 
     @property
     def domain(self) -> FloatArray:
-        """(n, 4) s from and to, t from and to, of each piece."""
+        """Domain of each piece, (n, 4): s from and to, t from and to."""
         box = self.local(np.stack([self.pieces.low, self.pieces.high], axis=1), self.owner)
         return np.clip(np.swapaxes(box, 1, 2).reshape(-1, 4), 0.0, 1.0)
 
     @property
     def lines(self) -> FloatArray:
-        """(n, 3) a, b, c on the patch: lit where a s + b t >= c."""
+        """Chord of each patch, (n, 3) a, b, c: lit where a s + b t >= c."""
         here = self.pieces
         return Pieces(here.wave, here.cell, here.low, here.high, self.local(here.chord, self.owner)).lines
 
     @property
     def place(self) -> npt.NDArray[np.int64]:
-        """(m, 2) row and column of patches that are cells of the grid, all of them lit; else -1."""
+        """Row and column (m, 2) of patches that are fully lit cells of the grid; else -1."""
         whole = (self.high - self.low == 1.0).all(axis=1) & (self.low == np.floor(self.low)).all(axis=1)
         whole[self.owner[~self.pieces.whole]] = False
         return np.where(whole[:, None], self.low[:, ::-1], -1.0).astype(np.int64)
 
     def where(self, good: npt.NDArray[np.bool_]) -> PatchFit:
-        """Some of the patches."""
+        """Subset of the patches."""
         kept = good[self.owner]
         number = np.cumsum(good) - 1
         return PatchFit(
@@ -92,13 +92,13 @@ class PatchFit:
         )  # fmt: skip
 
     def pixels(self, at: FloatArray, owner: Array) -> FloatArray:
-        """Points (n, 2) of the beam's grid on the CCD, by patches `owner` (n,)."""
+        """CCD coordinates of points (n, 2) of the beam's grid, by patches `owner` (n,)."""
         s, t = (np.stack([u**i for i in range(4)], axis=-1) for u in self.local(at, owner).T)
         lines = np.einsum("nfij,nj->nfi", self.coefficients[owner, :2], t)
         return np.asarray(np.einsum("nfi,ni->nf", lines, s), dtype=np.float64)
 
     def drawn(self, ends: FloatArray, owner: Array, most: int) -> FloatArray:
-        """Segments (m, 4) on the CCD of lines (n, 2, 2) on the beam's grid, a pixel long, `most` each."""
+        """CCD segments (m, 4) of lines (n, 2, 2) on the beam's grid, a pixel long, at most `most` each."""
         begin, end = np.moveaxis(ends, 1, 0)
         stops = [self.pixels(begin + f * (end - begin), owner) for f in (0.0, 0.5, 1.0)]
         length = sum(np.linalg.norm(b - a, axis=1) for a, b in pairwise(stops))
@@ -149,7 +149,7 @@ def _halton(count: int) -> FloatArray:
 
 
 def places(pieces: Pieces, owner: Array, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Places evenly spread over the lit parts of cells.
+    """Points spread evenly over the lit parts of cells.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def fitted(
     at: FloatArray, low: FloatArray, high: FloatArray, ray: Array, arrived: Arrivals, amplitude: ComplexArray,
     base: float, shape: tuple[int, int],
 ) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_], FloatArray]:  # fmt: skip
-    """Patches of a sheet by least squares.
+    """Wavefront patches fitted by least squares.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sheets of arrivals on smooth surfaces: a map from the beam to the CCD, interpolated to fourth order."""
+"""Wavefront patches: bicubic Hermite interpolation of arrivals from the beam's grid to the CCD."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame
+from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.field.wavefront.ray_tubes import along_grid, caustics, differences
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, pixels
 from fringetrace.tracing import Paths, components, landed
 
 # Of the fields of a cell (x, y, path, J) the amplitudes come last: two for each component.
@@ -51,7 +51,7 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class PatchCells:
-    """A sheet's cells as the kernels read them, see `raster_kernels`; for `place` see `leaved`."""
+    """Cells of a wavefront in the form that the kernels read; for `place` see `leaved`."""
 
     coefficients: FloatArray
     leaves: FloatArray
@@ -77,14 +77,14 @@ class PatchCells:
 
     @cached_property
     def folds(self) -> bool:
-        """Whether there are folds: then the field depends on the wavelength by more than the phase."""
+        """Whether there are folds, where the field depends on the wavelength beyond its phase."""
         from fringetrace.field.wavefront.raster_kernels import SIGN
 
         return bool(self.crossed.any() or (self.leaves[:, SIGN] == 0.0).any())
 
 
 def sheets(paths: Paths) -> Iterator[Sheet]:
-    """Arrivals of a beam, sorted by path key onto its grid.
+    """Arrivals of a beam on its grid, one table per path key.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def sheets(paths: Paths) -> Iterator[Sheet]:
 
 
 def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
-    """Arrivals of one sequence of surfaces, put onto a grid.
+    """Arrivals of one surface sequence on a grid.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
 
 @dataclass(frozen=True, eq=False)
 class Arrivals:
-    """Where and how (n,) paths of as many bounces arrive; as in `Sheet`, and for `caustics`.
+    """Arrivals of paths (n,) with equal numbers of bounces; as in `Sheet`, and for `caustics`.
 
     `length` is the whole path, `way` (n, bounces + 2, 3) the points that it went through, None unless
     recorded, `direction` (n, 3) that of its last leg, `last` that leg's length.
@@ -163,7 +163,7 @@ class Arrivals:
 
 
 def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
-    """Where and how paths of as many bounces cross the CCD's plane of focus.
+    """Arrivals of paths with equal numbers of bounces on the CCD's plane of focus.
 
     Parameters
     ----------
@@ -176,18 +176,18 @@ def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
     -------
     Arrivals
     """
-    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
+    u, v, _ = ccd.axes
     chosen = paths.where(rows)
     _, point, length = landed(chosen, ccd)
-    offset, direction = point - ccd.centre, chosen.direction
+    pixel, direction = pixels(ccd, point), chosen.direction
     way, last = None, np.zeros(len(rows))
     if chosen.points is not None:
         bounces = int(chosen.bounces.max(initial=0))
         way = np.concatenate([chosen.points[:, : bounces + 1], point[:, None]], axis=1)
         last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
     return Arrivals(
-        x=offset @ u / ccd.pitch + 0.5 * ccd.shape[1],
-        y=offset @ v / ccd.pitch + 0.5 * ccd.shape[0],
+        x=pixel[:, 1],
+        y=pixel[:, 0],
         slope_x=chosen.gradient @ u * ccd.pitch,
         slope_y=chosen.gradient @ v * ccd.pitch,
         length=length,
@@ -198,7 +198,7 @@ def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
 
 
 def checked(paths: Paths) -> tuple[CCD, Beam]:
-    """The CCD and the beam of paths, once they are known to have both.
+    """CCD and beam of paths; ValueError unless they have both.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def _interpolated(f: FloatArray) -> FloatArray:
 
 
 def patches(sheet: Sheet) -> tuple[FloatArray, FloatArray]:
-    """Hermite patches between the nodes of a sheet.
+    """Bicubic Hermite patches between the nodes of a grid.
 
     The optical path has the exact gradient, dW = p . dx; positions have tangents by differences
     of fourth order.
@@ -285,7 +285,7 @@ def leaved(
     lines: FloatArray,
     ccd: CCD,
 ) -> PatchCells:
-    """PatchCells and their leaves.
+    """Patch cells with their quadtree leaves.
 
     Parameters
     ----------
@@ -322,7 +322,7 @@ def leaved(
 
 
 def cells(sheet: Sheet, ccd: CCD) -> PatchCells:
-    """Hermite patches between the nodes of a sheet, and their leaves.
+    """Bicubic Hermite patches between the nodes of a grid, with their quadtree leaves.
 
     At the rim of the beam's grid a cell reaches on to the rim of the beam, half a cell beyond the rays.
 
@@ -352,14 +352,14 @@ def cells(sheet: Sheet, ccd: CCD) -> PatchCells:
 
 
 def largest(grid: Array, size: int) -> Array:
-    """Largest of each size x size window of a grid."""
+    """Maximum of each size x size window of a grid."""
     rows, columns = (n - size + 1 for n in grid.shape)
     window = range(size)
     return np.asarray(np.max([grid[i : i + rows, j : j + columns] for i in window for j in window], axis=0))
 
 
 def branch_turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int64]:
-    """Caustics passed in each cell where J < 0 and where J > 0: that of its corners of that sign.
+    """Caustics passed in each cell where J < 0 and where J > 0, from its corners of that sign.
 
     A fold that reaches into a cell, but to none of its corners, has them in the next cell.
     """

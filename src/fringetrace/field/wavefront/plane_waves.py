@@ -1,4 +1,4 @@
-"""Sheets off flat facets: a plane wave for each sequence of facets, and its region of the beam."""
+"""Plane waves off sequences of flat facets, and their regions of the beam."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame, unit
+from fringetrace.core import Array, ComplexArray, FloatArray, unit
 from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront.boundary_search import cut
 from fringetrace.field.wavefront.probe import RIM, profile
 from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
 from fringetrace.optics import refract
-from fringetrace.scene import CCD, Beam, Surface
-from fringetrace.tracing import Paths, components, indices, landed
+from fringetrace.scene import CCD, Beam, Surface, pixels
+from fringetrace.tracing import Paths, Segments, components, landed
 
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """A plane wave off a sequence of facets.
+    """Plane wave off a sequence of facets.
 
     Attributes
     ----------
@@ -48,13 +48,13 @@ class Wave:
     amplitude: ComplexArray
 
     def to_pixels(self, at: FloatArray) -> FloatArray:
-        """Points (..., 2) of the beam's grid on the CCD."""
+        """CCD coordinates of points (..., 2) of the beam's grid."""
         return np.asarray(self.origin + (at - self.start) @ self.matrix.T, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where on the beam's grid a wave starts: cells from `low` on, and pieces of cells, see `raster`.
+    """Region of the beam's grid where a wave starts: cells from `low` on, and pieces of cells.
 
     `segments` are the region's edges on the beam's grid, (n, 2, 2).
     """
@@ -83,29 +83,26 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
     assert paths.starts is not None
-    u, v, direction = frame(beam.direction, beam.up, "Beam")
+    assert paths.branch is not None
+    u, v, direction = beam.axes
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
     count = paths.bounces[row]
     legs = paths.points[row, 2 : count + 1] - paths.starts[row, 1:count]
     onward = np.concatenate([legs, paths.direction[row, None]])
-    index = indices(paths.where(np.array([row])))[0]
+    index = Segments.of(paths.where(np.array([row]))).index[0]
     for k, (surface, normal) in enumerate(_met(paths, row)):
-        leaving = onward[k] / np.linalg.norm(onward[k])
-        turned = direction - 2.0 * (direction @ normal) * normal
-        bent = refract(direction, normal, index[k], index[k + 1])
-        if hasattr(surface.interface, "act"):
-            bent = leaving
-        # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
-        mirror = getattr(surface.interface, "transmission", None) == 0.0
-        # NaN where light is totally reflected
-        if mirror or not np.linalg.norm(leaving - bent) <= np.linalg.norm(leaving - turned):
+        if paths.branch[row, k] == 0:
             across = across - 2.0 * np.outer(normal, normal @ across)
-            direction = turned
-        elif bent is not direction:
+            direction = direction - 2.0 * (direction @ normal) * normal
+            continue
+        bent = refract(direction, normal, index[k], index[k + 1])
+        if surface.element is not None:
+            bent = onward[k] / np.linalg.norm(onward[k])
+        if bent is not direction:
             # the step along the surface is the same on both sides
             across = across - np.outer(direction, (normal @ across) / (normal @ direction))
             direction = bent
-    right, up, facing = frame(ccd.normal, ccd.up, "CCD")
+    right, up, facing = ccd.axes
     # along the rays into the plane of focus
     across = across - np.outer(direction, (facing @ across) / (facing @ direction))
     _, point, length = landed(paths.where(np.array([row])), ccd)
@@ -115,11 +112,11 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     size = np.sqrt(beam.area / ccd.pitch**2 / spread) if spread > 0.0 else 0.0
     return Wave(
         name=name,
-        origin=axes @ (point[0] - ccd.centre) + 0.5 * np.array(ccd.shape[::-1]),
+        origin=pixels(ccd, point)[0, ::-1],
         matrix=matrix,
         start=start,
         path=float(length[0]),
-        gradient=index[-1] * np.array([direction @ right, direction @ up]) * ccd.pitch,
+        gradient=index[count] * np.array([direction @ right, direction @ up]) * ccd.pitch,
         amplitude=components(paths.where(np.array([row])), ccd)[:, 0] * size,
     )
 
@@ -134,7 +131,7 @@ def _near(wave: Wave, row: Array, column: Array, ccd: CCD) -> npt.NDArray[np.boo
 
 
 def plane_waves_of(survey: Survey) -> Iterator[tuple[Wave, Region]]:
-    """Plane waves on a CCD off the facets of a scene, and the regions of the beam they come from.
+    """Plane waves on a CCD off the facets of a scene, and their regions of the beam.
 
     Parameters
     ----------
@@ -227,7 +224,7 @@ def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64
 def find_contributions(
     wave: Wave, region: Region, beam: Beam, points: Samples, slope: FloatArray
 ) -> FloatArray:
-    """What a plane wave brings to sample points; exact but for rounding.
+    """Contributions of a plane wave at sample points, exact but for rounding.
 
     Parameters
     ----------

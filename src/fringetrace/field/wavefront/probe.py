@@ -1,4 +1,4 @@
-"""Which way light takes from any point of a beam: rays traced anew, named after what they meet."""
+"""Ray queries: which surface sequence light takes from any point of a beam, by new rays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FUZZ = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """A way to ask which sequences of surfaces the light takes from a point of the beam.
+    """Ray query for the surface sequences that light takes from points of the beam.
 
     `traced` are the paths whose scene is asked; `parts` are those of `group_facets`; `keys` the sequences
     that are looked at, of up to so many `bounces`; light fainter than `faintest` is not followed.
@@ -35,7 +35,7 @@ class Probe:
 
     @property
     def fuzz(self) -> FloatArray:
-        """How well edges are known, in cells of the beam's grid: along columns, along rows."""
+        """Uncertainty of edges in cells of the beam's grid: along columns, along rows."""
         bounds = np.stack([surface.mesh.bounds for surface in self.traced.scene.surfaces])
         size = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
         cells = np.array(self.beam.shape[::-1]) / np.array(self.beam.size)
@@ -95,7 +95,7 @@ class Probe:
 
 
 def profile(beam: Beam, at: FloatArray) -> FloatArray:
-    """Amplitude of a beam at points of its grid.
+    """Beam amplitude at points of its grid.
 
     Parameters
     ----------

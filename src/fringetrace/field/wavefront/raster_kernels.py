@@ -1,4 +1,4 @@
-"""Fused float64 passes from sheets of arrivals to sample points on the pixels, compiled by numba.
+"""Compiled rasterisation of wavefront patches onto sample points of the pixels.
 
 A sheet maps grid coordinates (s along columns, t along rows) to CCD coordinates in pixels. A cell of
 a curved sheet has the fields X, Y, W, J, and the two parts of the amplitude, each as the 4 x 4
@@ -32,7 +32,7 @@ NUDGE_S, NUDGE_T = 1.2345e-9, 2.7183e-9
 
 @part
 def patch(cells, cell, f, s, t):
-    """Value of field f of a cell and its derivatives along s and t."""
+    """Value of field f of a cell, with derivatives along s and t."""
     value, along_s, along_t = 0.0, 0.0, 0.0
     for i in range(3, -1, -1):
         c0, c1 = cells[cell, f, i, 0], cells[cell, f, i, 1]
@@ -58,7 +58,7 @@ def scalar(cells, cell, f, s, t):
 
 @jit
 def survey(cells, cell, s0, s1, t0, t1):
-    """Least and largest J, and the box, of part of a cell: of 5 x 5 probes, the box with a margin."""
+    """Range of J and bounding box over part of a cell, from 5 x 5 points, the box with a margin."""
     least, most = np.inf, -np.inf
     left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
     for i in range(5):
@@ -74,7 +74,7 @@ def survey(cells, cell, s0, s1, t0, t1):
 
 @jit
 def split_cells(cells, domain, lines, rows, columns):
-    """Leaves of cells, from their domains (s from and to, t from and to) and lines (a, b, c).
+    """Quadtree leaves of cells, from their domains (s from and to, t from and to) and chords (a, b, c).
 
     Those that no pixel sees are left out.
     """
@@ -125,7 +125,7 @@ CLOSE = 1e-4
 
 @part
 def newton(px, py, xs, xt, ys, yt, area, x, y, wide, tall):
-    """Newton's step to (x, y) from a point of the map, of 3/4 leaf at most, and its full length in leaves."""
+    """Newton step to (x, y) from a point of the map, limited to 3/4 leaf, and its full length in leaves."""
     dx, dy = x - px, y - py
     ds, dt = (yt * dx - xt * dy) / area, (xs * dy - ys * dx) / area
     stretch = max(abs(ds) / wide, abs(dt) / tall)
@@ -136,7 +136,7 @@ def newton(px, py, xs, xt, ys, yt, area, x, y, wide, tall):
 
 @part
 def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
-    """Where in a regular leaf the map meets (x, y), from (s, t) on: found, s, t and the Jacobian there."""
+    """Root (s, t) of the map at (x, y) in a regular leaf: found, s, t and the Jacobian there."""
     wide, tall = s1 - s0, t1 - t0
     area = 0.0
     for _ in range(12):
@@ -158,7 +158,7 @@ def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
 
 @part
 def plain(cells, cell, s, t, area, unit, period):
-    """The wave of one branch: amplitude, spread over |area|, and path."""
+    """Wave of one branch: amplitude, spread over |area|, and path."""
     way = scalar(cells, cell, 2, s, t)
     amplitude = complex(scalar(cells, cell, 4, s, t), scalar(cells, cell, 5, s, t))
     turn = 2.0 * np.pi * ((way % period) / period)
@@ -177,7 +177,7 @@ def gradient(cells, cell, s, t):
 
 @jit
 def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y, slope):
-    """What regular leaves bring to the sample points of a band of pixels that begins at row `top`.
+    """Contributions of regular leaves at the sample points of a band of pixels from row `top` on.
 
     A row for each: the number of the point, the optical path, real and imaginary part of each component
     of the amplitude. `folded` marks cells in which J changes its sign, `turns` has their caustics passed
@@ -227,7 +227,7 @@ def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, 
 
 @jit
 def add_waves(rows, begin, component, period, group, factor, field):
-    """Add waves at a wavelength to the fields of their groups; `rows` as `leaf_contributions` has them.
+    """Add waves at a wavelength to the fields of their groups; `rows` as in `leaf_contributions`.
 
     Those of wave w are rows begin[w] to begin[w + 1]; they are multiplied by factor[w].
     """
@@ -249,7 +249,7 @@ def add_waves(rows, begin, component, period, group, factor, field):
 
 @part
 def widen(slope, across, up):
-    """Let a range take in one more gradient."""
+    """Extend a range by one gradient."""
     slope[0], slope[1] = min(slope[0], across), max(slope[1], across)
     slope[2], slope[3] = min(slope[2], up), max(slope[3], up)
 
@@ -259,7 +259,7 @@ def plane_wave_contributions(
     inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, first,
     x, y, where_x, where_y, shape, slope, pixels,
 ):  # fmt: skip
-    """What a plane wave brings to the sample points that its region of the beam reaches.
+    """Contributions of a plane wave at the sample points that its region of the beam reaches.
 
     (s, t) = inverse (point - origin); the path at the origin is `path`, its gradient `gradient`.
     `kind` of each cell from (low_s, low_t) on: 0 dark, 1 lit, 2 in pieces, those of the cell from

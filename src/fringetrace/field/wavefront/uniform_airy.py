@@ -1,4 +1,4 @@
-"""Folds of sheets (caustics on the CCD): the waves beside them, uniform across (Airy).
+"""Uniform Airy field across folds (caustics on the CCD), after Chester, Friedman and Ursell.
 
 Where the Jacobian J of the map from the beam's grid to the CCD changes its sign, two branches of a
 sheet end. On the lit side of a fold they add to
@@ -68,7 +68,7 @@ from fringetrace.field.wavefront.raster_kernels import (
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """PatchCells of a sheet, see `PatchCells`, and the folds on it at a wavelength.
+    """Folds of a wavefront at a wavelength, with its `PatchCells`.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Folds:
 
 
 def folds(sheet: PatchCells, period: float, unit: float, component: int = 0) -> Folds:
-    """Find the folds of a sheet.
+    """Find the folds of a wavefront.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def folds(sheet: PatchCells, period: float, unit: float, component: int = 0) -> 
 
 
 def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
-    """Field of a sheet at sample points.
+    """Field of a wavefront at sample points.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
 
 
 def uniform(rows: FloatArray, period: float) -> ComplexArray:
-    """The field of two branches by the formula above, or what it has beyond rays' (Airy's asymptotes)."""
+    """Uniform Airy field of two branches, or its difference from the ray field (Airy's asymptotes)."""
     from scipy.special import airy
 
     ai, slope, _, _ = airy(-rows[:, Z])
@@ -184,7 +184,7 @@ def uniform(rows: FloatArray, period: float) -> ComplexArray:
 
 
 def touched(latest: npt.NDArray[np.int64], points: Samples, leaves: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whether the box of each leaf holds a pixel with a sample beside a fold."""
+    """Whether the box of each leaf contains a pixel with a sample beside a fold."""
     sample = np.concatenate([[0], np.cumsum(latest >= 0)])
     pixels = (np.diff(sample[points.first]) > 0).reshape(-1, points.columns)
     total = np.pad(pixels.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
@@ -198,7 +198,7 @@ def touched(latest: npt.NDArray[np.int64], points: Samples, leaves: FloatArray) 
 
 @part
 def inside(cells, cell, leaf, sign, s, t, x, y):
-    """Where in a leaf a branch of the map meets (x, y), from (s, t) on: found, s, t and the Jacobian."""
+    """Root (s, t) of the map at (x, y) in a leaf, with the Jacobian there."""
     wide, tall = leaf[S1] - leaf[S0], leaf[T1] - leaf[T0]
     leave = 2.0 if leaf[SIGN] == 0.0 else 0.5
     area = 0.0
@@ -224,7 +224,7 @@ def inside(cells, cell, leaf, sign, s, t, x, y):
 
 @jit
 def halved(cells, cell, sign, s, t, ds, dt):
-    """A step, halved until it does not cross the fold."""
+    """Newton step halved until it does not cross the fold."""
     for _ in range(6):
         _, xs, xt = patch(cells, cell, 0, s + ds, t + dt)
         _, ys, yt = patch(cells, cell, 1, s + ds, t + dt)
@@ -236,7 +236,7 @@ def halved(cells, cell, sign, s, t, ds, dt):
 
 @part
 def probe(cells, cell, leaf, sign):
-    """Where to start in a leaf: its middle, or in a fold the probe with the largest J of that sign."""
+    """Start of the root search in a leaf: its middle, or the point with the largest J of one sign."""
     best, at_s, at_t = 0.0, 0.5 * (leaf[S0] + leaf[S1]), 0.5 * (leaf[T0] + leaf[T1])
     if leaf[SIGN] != 0.0:
         return True, at_s, at_t
@@ -256,7 +256,7 @@ def probe(cells, cell, leaf, sign):
 def add_folds(
     leaves, cells, folded, turns, unit, period, place, rows, latest, top, columns, first, x, y, field, slope
 ):
-    """Add the waves of leaves on and beside folds, but those of `rows`; see `leaf_contributions`."""
+    """Add the waves of leaves on and beside folds, except `rows`; see `leaf_contributions`."""
     for leaf in leaves:
         cell = int(leaf[CELL])
         low, above = max(int(np.floor(leaf[LOW])), top), int(np.floor(leaf[HIGH]))

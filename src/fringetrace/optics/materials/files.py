@@ -1,4 +1,4 @@
-"""Files of refractive indices: tables as CSV, and the YAML of refractiveindex.info."""
+"""Refractive index files: CSV tables, and YAML pages of refractiveindex.info."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _table(wavelength: FloatArray, value: FloatArray, what: str) -> IndexTable:
 
 
 def read_index_csv(path: Path, unit: str | None) -> IndexData:
-    """Curves of a table: wavelength, n and, if there is a third column, kappa.
+    """Read n and kappa from a CSV table: wavelength, n and, if there is a third column, kappa.
 
     Lines from # on are remarks; those before the table are its source. A first line of words
     names the columns; the unit stands in it behind the wavelength, as ``wavelength (nm),n,k``.
@@ -120,7 +120,7 @@ def _entry(entry: Any, what: str) -> tuple[Curve | None, Curve | None]:
 
 
 def read_yaml(path: Path) -> IndexData:
-    """Curves of a page of refractiveindex.info: formulas 1 to 9, tables of n, k or both.
+    """Read n and kappa from a page of refractiveindex.info: formulas 1 to 9, tables of n, k or both.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Materials: complex refractive indices n + i kappa over the vacuum wavelength.
+"""Materials: complex refractive index n + i kappa over the vacuum wavelength.
 
 With fields as exp(+i k n x), kappa > 0 absorbs. Outside the range that was measured there is no index.
 """
@@ -21,7 +21,7 @@ SLACK = 1e-12
 
 @dataclass(frozen=True)
 class Material:
-    """A refractive index with a name; two of the same index are equal, whatever they are called.
+    """Material: a complex refractive index with a name. Equal indices make equal materials.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Material:
 
     @property
     def dispersive(self) -> bool:
-        """Whether the index may change with the wavelength."""
+        """Whether the index may depend on the wavelength."""
         return any(
             not (isinstance(curve, IndexFormula) and curve.form == "constant")
             for curve in (self.n, self.kappa)
@@ -63,7 +63,7 @@ class Material:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """First and last wavelength with an index, metres; None: any."""
+        """Wavelength range of the index, metres: first and last; None: any."""
         ranges = [
             curve.range for curve in (self.n, self.kappa) if curve is not None and curve.range is not None
         ]
@@ -72,7 +72,7 @@ class Material:
         return max(low for low, _ in ranges) * um, min(high for _, high in ranges) * um
 
     def index(self, wavelength: npt.ArrayLike) -> ComplexArray:
-        """Complex refractive index.
+        """Complex refractive index at wavelengths.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ def _in_um(limits: tuple[float, float] | None) -> tuple[float, float] | None:
 
 
 def constant(n: complex, name: str = "") -> Material:
-    """The same index at every wavelength.
+    """Material of the same index at every wavelength.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def cauchy(
     range: tuple[float, float] | None = None,
     source: str = "",
 ) -> Material:
-    """Cauchy's n = a + b / w^2 + c / w^4 + ...
+    """Material by Cauchy's formula n = a + b / w^2 + c / w^4 + ...
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def sellmeier(
     range: tuple[float, float] | None = None,
     source: str = "",
 ) -> Material:
-    """Sellmeier's n^2 = 1 + offset + sum of B w^2 / (w^2 - C).
+    """Material by Sellmeier's formula n^2 = 1 + offset + sum of B w^2 / (w^2 - C).
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def tabulated(
     name: str = "table",
     source: str = "",
 ) -> Material:
-    """An index through measured points; n and kappa each run straight from one point to the next.
+    """Material by linear interpolation of measured n and kappa.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def tabulated(
 
 
 def absorbing(material: Material, strength: float, length: float) -> Material:
-    """A material with an absorption that falls off, kappa = strength exp(-w / length).
+    """Material with an exponential absorption, kappa = strength exp(-w / length).
 
     Parameters
     ----------

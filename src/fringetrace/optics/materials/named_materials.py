@@ -1,4 +1,4 @@
-"""Materials by name, from files, and by what stands for one.
+"""Named materials, and materials from files, numbers or names.
 
 Kinds: `constant`, `cauchy`, `sellmeier`, `tabulated`; with an absorption that falls off: `absorbing`.
 """
@@ -22,7 +22,7 @@ __all__ = [
 
 
 def load(path: str | Path, *, unit: str | None = None, name: str | None = None) -> Material:
-    """A material from a file.
+    """Load a material from a file.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def _plain(text: str) -> str:
 
 
 def named(text: str) -> Material:
-    """A material by its name; case, spaces and hyphens do not matter.
+    """Material by its name; case, spaces and hyphens do not matter.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def named(text: str) -> Material:
 
 
 def as_material(value: Material | complex | str, what: str = "material") -> Material:
-    """A material from what stands for one.
+    """Material from a material, a name or an index.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Pictures of BRDFs: heat maps over angles, polar lobes, spectrograms, and pages of them."""
+"""BRDF plots: heat maps over angles, polar lobes, spectrograms, overviews."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def _bar(ax: Axes, drawn: Any, label: str, away: float = 0.03) -> None:
 def brdf(
     table: DataArray, ax: Axes | None = None, *, wavelength: float | None = None, title: str | None = None
 ) -> Axes:
-    """A BRDF in the plane of incidence: a heat map, the angle of the light upwards, of the eye to the right.
+    """Plot a BRDF in the plane of incidence: heat map of incident against outgoing angle.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def brdf(
 def polar(
     table: DataArray, ax: Axes | None = None, *, wavelength: float | None = None, title: str | None = None
 ) -> Axes:
-    """A BRDF on polar axes: curves in the plane of incidence, or a map of the hemisphere.
+    """Plot a BRDF on polar axes: lobes in the plane of incidence, or a map of the hemisphere.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _hemisphere(table: DataArray, ax: Any) -> None:
 def spectrogram(
     table: DataArray, ax: Axes | None = None, *, top: float | None = None, title: str | None = None
 ) -> Axes:
-    """A BRDF from one direction against wavelength and angle of observation: a heat map.
+    """Plot a BRDF of one incidence over wavelength and outgoing angle.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def _incidences(table: DataArray, observed: tuple[str, ...]) -> list[tuple[str, 
 
 
 def overview(table: DataArray, columns: int = 4) -> Figure:
-    """A spectrogram for each incidence, and each parameter of a study, to one scale.
+    """Plot one spectrogram per incidence and parameter of a study, to one scale.
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def overview(table: DataArray, columns: int = 4) -> Figure:
 
 
 def mirror_spectra(table: DataArray, measured: DataArray | None = None, columns: int = 4) -> Figure:
-    """Spectra towards the mirror's direction, or the nearest observed: a panel for each incidence.
+    """Plot spectra in the specular direction, or the nearest observed: one panel per incidence.
 
     Parameters
     ----------

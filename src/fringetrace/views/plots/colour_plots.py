@@ -1,4 +1,4 @@
-"""Pictures of colour: swatches, strips, maps over angles, spheres, spectra with measured ones laid over."""
+"""Colour plots: swatches, strips, maps over angles, spheres, spectra."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _colours(xyz: npt.ArrayLike, dimensions: int, gamut: str) -> FloatArray:
 def swatches(
     xyz: npt.ArrayLike, labels: Sequence[str], ax: Axes | None = None, *, gamut: str = "clip"
 ) -> Axes:
-    """Squares of colour side by side, each with its name below.
+    """Plot colour swatches side by side, each with its name below.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def swatches(
 def strip(
     xyz: npt.ArrayLike, places: npt.ArrayLike, ax: Axes | None = None, *, label: str = "", gamut: str = "clip"
 ) -> Axes:
-    """A strip of colour along an axis of thickness, angle or path.
+    """Plot a strip of colour along an axis of thickness, angle or path.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def angles(
     *,
     gamut: str = "clip",
 ) -> Axes:
-    """Colours against the angles of light and eye.
+    """Plot colours over the angles of light and eye.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def angles(
 def draw_sphere(
     xyz: npt.ArrayLike, ax: Axes | None = None, *, title: str | None = None, gamut: str = "clip"
 ) -> Axes:
-    """A picture of a sphere, as of `bsdf_tables.shaded_sphere` or `mirrored`, on dark grey.
+    """Plot a sphere in colour, see `bsdf_tables.shaded_sphere` and `mirrored`, on dark grey.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def draw_sphere(
 
 
 def mirrored(xyz: npt.ArrayLike, theta: npt.ArrayLike, pixels: int = 256) -> FloatArray:
-    """A shining sphere under a white sky all around: every place shows its colour at its own angle.
+    """Sphere that reflects a uniform white sky: each place has the colour of its own angle.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def coloured_spectra(
     labels: Sequence[str] = (),
     measured: DataArray | None = None,
 ) -> Axes:
-    """Spectra over the colours of their wavelengths, with measured ones as dashed lines.
+    """Plot spectra over the colours of their wavelengths, with measured ones as dashed lines.
 
     Parameters
     ----------

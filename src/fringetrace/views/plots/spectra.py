@@ -1,4 +1,4 @@
-"""Pictures of curves: spectra over the colours of their wavelengths, run time against error."""
+"""Plots of spectra over the colours of their wavelengths, and of run time against error."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Panels = Mapping[str, Curves]
 
 
 def new_axes(width: float = 7.0, height: float = 4.0, projection: str | None = None) -> Axes:
-    """Axes in a figure of their own.
+    """Axes in a new figure.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def new_axes(width: float = 7.0, height: float = 4.0, projection: str | None = N
 
 
 def short(name: str, value: Any) -> str:
-    """A coordinate for a title or legend: angles in degrees, small lengths in nm.
+    """Short text of a coordinate for titles and legends: degrees, nm.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def short(name: str, value: Any) -> str:
 
 
 def axis_label(table: DataArray) -> str:
-    """Name and unit of a table's values, for an axis or a colour bar.
+    """Axis label of a table's values: name and unit.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def axis_label(table: DataArray) -> str:
 
 
 def styles(count: int, what: str) -> list[tuple[str, str, str]]:
-    """Colour, mark and line for a few curves.
+    """Colours, markers and line styles for a few curves.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def styles(count: int, what: str) -> list[tuple[str, str, str]]:
 
 
 def cell_edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
-    """Sides of cells: halfway between neighbouring places, and as far beyond the last.
+    """Cell edges: midpoints between neighbouring places, extended at both ends.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def cell_edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
 
 
 def rainbow(ax: Axes) -> None:
-    """The colours of the wavelengths in a strip along the bottom of axes, over nm.
+    """Draw the colours of the wavelengths in a strip along the bottom of axes in nm.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def rainbow(ax: Axes) -> None:
 
 
 def lay_over(ax: Axes, measured: DataArray, scale: float = 1.0, note: str = "") -> None:
-    """Measured spectra as black broken lines over others.
+    """Draw measured spectra over others, as dashed black lines.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def lay_over(ax: Axes, measured: DataArray, scale: float = 1.0, note: str = "") 
 def spectra(
     table: DataArray, ax: Axes | None = None, *, measured: DataArray | None = None, title: str | None = None
 ) -> Axes:
-    """Spectra over the colours of their wavelengths, with measured ones laid over as black broken lines.
+    """Plot spectra over the colours of their wavelengths, with measured ones as dashed black lines.
 
     Parameters
     ----------
@@ -244,7 +244,7 @@ def work_precision(
     legend: bool = True,
     title: str | None = None,
 ) -> Axes:
-    """Error against seconds or rays, logarithmic.
+    """Plot error against seconds or rays, logarithmic.
 
     Parameters
     ----------
@@ -287,7 +287,7 @@ def work_precision(
 
 
 def comparison(panels: Panels) -> Figure:
-    """Error against seconds and against rays, a pair of axes for each panel, to one scale.
+    """Plot error against seconds and against rays, two axes per panel, to one scale.
 
     Parameters
     ----------

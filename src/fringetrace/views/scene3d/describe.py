@@ -1,4 +1,4 @@
-"""A path in words: what it met, how long it was, and with which phase it ends."""
+"""Description of one path in words: surfaces, lengths, phase and power."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NOTHING = 1e-12
 
 
 def describe_path(paths: Paths, row: int, wavelength: float | None = None) -> str:
-    """One path in words: places, surfaces met, lengths, phase and power.
+    """Describe one path in words: places, surfaces, lengths, phase and power.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def describe_path(paths: Paths, row: int, wavelength: float | None = None) -> st
 
 
 def describe_polyline(shown: Strands, number: int, wavelength: int | None = None, step: float = 0.0) -> str:
-    """One of the strands in words.
+    """Describe one of the sampled paths in words.
 
     Parameters
     ----------

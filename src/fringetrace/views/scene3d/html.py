@@ -1,4 +1,4 @@
-"""A scene as one HTML file that needs neither network nor server: to turn, to re-phase, to click on rays."""
+"""HTML page of a scene: one file without network, to rotate, re-phase and inspect rays."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ GREYS = [[0.0, "#000000"], [1.0, "#ffffff"]]
 
 
 def write_page(view: View, path: str | os.PathLike[str], title: str = "fringetrace") -> None:
-    """Write a page; the file is there in full or not at all.
+    """Write the HTML page of a scene, atomically.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def write_page(view: View, path: str | os.PathLike[str], title: str = "fringetra
 
 
 def page_text(view: View, title: str) -> str:
-    """The text of a page.
+    """Text of the HTML page.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def page_text(view: View, title: str) -> str:
 
 
 def contents(view: View) -> dict[str, Any]:
-    """All that a page shows, as it goes into JSON.
+    """Contents of the HTML page, as they go into JSON.
 
     Parameters
     ----------

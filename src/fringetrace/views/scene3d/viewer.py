@@ -1,4 +1,4 @@
-"""Scenes and benches to look at: a picture, a window, a page for a browser, files for other programs."""
+"""3D views of scenes and interferometers: picture, window, HTML page, export."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import FloatArray
-from fringetrace.instruments import Bench, Mark
+from fringetrace.instruments import Interferometer, Mark
 from fringetrace.scene import Scene
 from fringetrace.tracing import Paths
 from fringetrace.views.scene3d import formats, html
@@ -31,7 +31,7 @@ ONWARD = 0.3
 
 
 class Looks(TypedDict, total=False):
-    """How a scene is drawn; see `scene_view`."""
+    """Drawing options of a scene; see `view`."""
 
     colour: str
     wavelength: float | None
@@ -49,7 +49,7 @@ class Looks(TypedDict, total=False):
 
 
 def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
-    """A grid of rays of the same proportions, few enough to look at.
+    """Coarser grid of rays of the same proportions, for drawing.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
 
 
 def scene_view(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several = None,
     *,
     colour: str = "route",
@@ -84,11 +84,11 @@ def scene_view(
     tubes: float = 0.0,
     sweep: int = 1,
 ) -> View:
-    """What is to be drawn, as plain arrays.
+    """View of a scene as plain arrays.
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
         A bench brings its rays, its image (with a wavelength), and what a phase step turns.
     paths : Paths, or a sequence of them, optional
         Traced with record=True; of several beams. Those that reached the CCD are drawn; all, if none did.
@@ -133,9 +133,9 @@ def scene_view(
         If the paths have no recorded points, a name or a way of colouring is unknown, the image does not fit.
     """
     checked_colouring(colour, None)
-    if isinstance(scene, Bench):
+    if isinstance(scene, Interferometer):
         paths = scene.sampled(few(scene.beam.shape), wavelength) if paths is None else paths
-        reference = (scene.mark or Mark(scene.reference)) if reference is None else reference
+        reference = scene.arms.reference if reference is None else reference
         if image is None and wavelength is not None and sweep == 1:
             image = scene.interferogram(wavelength, step=step)
         scene = scene.scene
@@ -162,18 +162,18 @@ def _shift(explode: float | npt.ArrayLike, shown: Strands | None) -> FloatArray:
 
 
 def picture(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several | Callable[[], Several],
     path: str | os.PathLike[str],
     *,
     size: tuple[int, int] = (1600, 1000),
     **looks: Unpack[Looks],
 ) -> None:
-    """A PNG of a scene, drawn off-screen in a process of its own.
+    """Write a PNG picture of a scene, drawn off-screen in a separate process.
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`; or callable
         A function that gives them is called while VTK is loaded.
     path : path
@@ -192,17 +192,17 @@ def picture(
 
 
 def show(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several = None,
     *,
     size: tuple[int, int] = (1600, 1000),
     **looks: Unpack[Looks],
 ) -> None:
-    """A window with a scene: to turn and zoom, with sliders, clipping, and rays to click on.
+    """Show a scene in a window, with sliders, a clipping plane and rays to click on.
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`
     size : (width, height), pixels
     **looks
@@ -219,18 +219,18 @@ def show(
 
 
 def page(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several,
     path: str | os.PathLike[str],
     *,
     title: str = "fringetrace",
     **looks: Unpack[Looks],
 ) -> None:
-    """One HTML file with a scene to turn, to re-phase, to click on; it needs neither network nor server.
+    """Write an interactive HTML page of a scene: one file that needs neither network nor server.
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`
     path : path
     title : str
@@ -248,13 +248,13 @@ def page(
 
 
 def export(
-    scene: Scene | Bench, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
+    scene: Scene | Interferometer, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
 ) -> None:
-    """Surfaces and rays for other programs: .glb, .ply or .vtp, in metres.
+    """Export surfaces and rays as .glb, .ply or .vtp, in metres.
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
     paths : as in `scene_view`
     path : path
         Its suffix says the kind, see `exports.write_view`.
@@ -269,11 +269,11 @@ def export(
     formats.write_view(scene_view(scene, paths, **looks), path)
 
 
-def _interactive(scene: Scene | Bench, paths: Several, looks: Looks) -> View:
+def _interactive(scene: Scene | Interferometer, paths: Several, looks: Looks) -> View:
     """A view with phases at many wavelengths, and of a bench with an image for each phase step."""
     found = scene_view(scene, paths, sweep=SWEEP, **looks)
     frames, wavelength = None, looks.get("wavelength")
-    if isinstance(scene, Bench) and looks.get("image") is None and wavelength is not None:
+    if isinstance(scene, Interferometer) and looks.get("image") is None and wavelength is not None:
         frames = _binned(scene.phase_steps(wavelength, STEPS))
     panels = [
         panel if panel.name != "CCD" else replace(panel, image=_shown(panel.image, frames))

@@ -1,4 +1,4 @@
-"""Scenes in space drawn by VTK: surfaces, rays, sources and CCD, with axes, legends and a scale bar."""
+"""3D drawing by VTK: surfaces, rays, sources and CCD, with axes, legends and a scale bar."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ BELOW = 0.02
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What is drawn, and how.
+    """View to draw: contents and drawing options.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class View:
 
 
 def path_lines(view: View) -> PolyData:
-    """Legs of rays as lines, two points each.
+    """Ray segments as line data, two points each.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def path_lines(view: View) -> PolyData:
 
 
 def surface(solid: Solid, metres: float) -> PolyData:
-    """A surface's triangles.
+    """Triangle data of a surface.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def surface(solid: Solid, metres: float) -> PolyData:
 
 
 def chip(panel: Panel, metres: float) -> PolyData:
-    """The pixels of a CCD as squares with their light, `image`; row 0 below, seen from its front.
+    """CCD pixels as squares with their irradiance `image`; row 0 below, seen from the front.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def _legend(plotter: Plotter, entries: Sequence[tuple[str, str]], left: float, t
 
 
 def font_size(plotter: Plotter, size: int) -> int:
-    """A font's size in proportion to the picture.
+    """Font size in proportion to the picture.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _short(name: str) -> str:
 
 
 def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
-    """Rays, what their colours stand for, and how many they are.
+    """Draw rays, their colour legend and their number.
 
     Parameters
     ----------
@@ -325,7 +325,7 @@ def _fitting(bounds: Sequence[float], size: Sequence[int]) -> float:
 
 
 def clip_plane(plotter: Plotter, normal: FloatArray | None, origin: FloatArray | None) -> None:
-    """Hide all that is on the side of a plane that its normal points to.
+    """Clip all objects at a plane: hide the side that its normal points to.
 
     Parameters
     ----------
@@ -348,7 +348,7 @@ def clip_plane(plotter: Plotter, normal: FloatArray | None, origin: FloatArray |
 
 
 def draw(plotter: Plotter, view: View) -> PolyData | None:
-    """The whole scene, seen from -y, a little from the right and from above.
+    """Draw the whole scene, seen from -y, slightly from the right and from above.
 
     Parameters
     ----------
@@ -386,7 +386,7 @@ def draw(plotter: Plotter, view: View) -> PolyData | None:
 
 
 def empty(size: tuple[int, int], off_screen: bool = True) -> Plotter:
-    """A plotter with nothing in it; VTK is loaded.
+    """Empty plotter; imports VTK.
 
     Parameters
     ----------
