@@ -6,11 +6,11 @@ import pickle
 import glass
 import numpy as np
 import pytest
-from fringetrace.instruments.rig import Rig
 
 import fringetrace as ft
 from fringetrace import nm, um
 from fringetrace.geometry import forms, shapes
+from fringetrace.instruments import Arms, Interferometer, Mark
 from fringetrace.optics import materials, polarisers
 from fringetrace.optics.films import Film
 from fringetrace.optics.materials.dispersion import IndexTable
@@ -350,13 +350,13 @@ def test_what_is_dark_is_relative_to_the_light(amplitude):
         at_wavelength(dark, 500 * nm)
 
 
-def test_a_rig_traces_again_where_branches_were_dark():
+def test_an_interferometer_traces_again_where_branches_were_dark():
     """An etalon swept from the wavelength at which its coating is dark is as bright as traced at each."""
     plate = glass.stack([1.0, 1.5], films=[QUARTER])
     beam = ft.Beam((0, 0, 0.01), (0, 0, -1), (0, 1, 0), (1e-3, 1e-3), (8, 8))
     ccd = ft.CCD((0, 0, 0.02), (0, 0, -1), (0, 1, 0), 1e-4, (8, 8))
-    swept = Rig(plate, beam, ccd, 0)
+    swept = Interferometer(plate, beam, ccd, Arms(Mark(0)))
     for wavelength in (600 * nm, 500 * nm, 550 * nm):
-        fresh = Rig(plate, beam, ccd, 0)
+        fresh = Interferometer(plate, beam, ccd, Arms(Mark(0)))
         np.testing.assert_allclose(swept.fields(wavelength), fresh.fields(wavelength), atol=1e-12)
     assert swept.traced == (600 * nm, 500 * nm)
