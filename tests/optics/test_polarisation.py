@@ -21,9 +21,8 @@ def test_names_stand_for_jones_vectors():
 
 def test_unpolarised_light_is_the_mean_of_two_orthogonal_states():
     """The coherency matrix, J J^H in the mean, is half the unit matrix."""
-    matrix = np.mean(
-        [np.outer(one, np.conj(one)) for one in jones_states("unpolarised", (1, 1), "light")[0]], axis=0
-    )
+    (states,) = jones_states("unpolarised", (1, 1), "light")
+    matrix = np.mean([np.outer(one, np.conj(one)) for one in states], axis=0)
     np.testing.assert_array_equal(matrix, 0.5 * np.eye(2))
 
 

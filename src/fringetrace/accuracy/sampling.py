@@ -34,7 +34,7 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
 
 
 def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
-    """Rows of pixels that stand for all: some near the lower end, the middle, the upper end.
+    """Bands of pixel rows that represent all: near the lower end, the middle, the upper end.
 
     Parameters
     ----------

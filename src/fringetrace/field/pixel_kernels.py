@@ -12,7 +12,7 @@ from fringetrace.core import grown, jit, part
 
 @jit
 def means(first, weight, field, mean):
-    """Weighted means over the samples of each pixel of the fields."""
+    """Weighted means of the fields over the samples of each pixel."""
     for m in range(len(field)):
         for pixel in range(len(first) - 1):
             total = 0.0j
@@ -23,7 +23,7 @@ def means(first, weight, field, mean):
 
 @jit
 def products(first, weight, field, mutual):
-    """Weighted means over the samples of each pixel of E_m conj(E_n)."""
+    """Weighted means of E_m conj(E_n) over the samples of each pixel."""
     groups = len(field)
     for pixel in range(len(first) - 1):
         for m in range(groups):

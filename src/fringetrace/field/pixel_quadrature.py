@@ -1,4 +1,4 @@
-"""Means over pixels of fields and of their products: from few points where light is even, else from many."""
+"""Quadrature over pixels: means of fields and of their products, from as many points as they need."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Orders = npt.NDArray[np.int64]
 
 
 class Case(NamedTuple):
-    """A wavelength (metres) and component of the field, and the image that it is added to with a weight."""
+    """Wavelength (metres) and field component, and the image that it is added to with a weight."""
 
     wavelength: float
     component: int = 0
@@ -33,12 +33,12 @@ class Case(NamedTuple):
 
 
 class SampledLight(Protocol):
-    """Fields of some groups at sample points."""
+    """Protocol of fields of groups at sample points."""
 
     groups: int
 
     def at(self, points: Samples, slopes: bool) -> Any:
-        """What is the same at all wavelengths."""
+        """Part of the evaluation that is the same at all wavelengths."""
 
     def field(self, found: Any, case: Case) -> tuple[ComplexArray, FloatArray]:
         """Fields (groups, points), and slopes, see `fringes`: (points, 4), or (0, 4) if not wanted."""
@@ -74,7 +74,7 @@ def averaged(
     more: int = 0,
     rows: tuple[int, int] | None = None,
 ) -> ComplexArray:
-    """Means over the pixels of the fields of some groups, or of their products.
+    """Means over the pixels of the fields of groups, or of their products.
 
     Where light is even its value at the centre will do, with a quarter of a quarter of its curvature:
     the mean of f over a pixel is f + (f_xx + f_yy) / 24 to fourth order (Euler and Maclaurin).

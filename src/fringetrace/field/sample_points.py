@@ -1,4 +1,4 @@
-"""Sample points on the pixels: how many a fringe needs, where they lie, and means over them."""
+"""Sample points on the pixels: their number, their positions, and means over them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BAND = 1 << 18
 
 
 def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
-    """Gauss points that integrate so many cycles of a wave over an interval.
+    """Number of Gauss points that integrate so many cycles of a wave over an interval.
 
     n points miss exp(i pi c u) over -1 < u < 1 by about (e pi c / 4 n)^2n (remainder of the Gauss
     rule, with Stirling's formula).
@@ -51,7 +51,7 @@ def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
 
 
 def gauss_table(orders: Array) -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights on [0, 1] of the Gauss-Legendre rules.
+    """Nodes and weights of the Gauss-Legendre rules on [0, 1].
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Samples:
     where_y: FloatArray
 
     def blank(self, groups: int) -> ComplexArray:
-        """No light yet: (groups, points) zeros."""
+        """Zero field at the sample points, (groups, points)."""
         return np.zeros((groups, len(self.x)), dtype=np.complex128)
 
     def means(self, field: ComplexArray) -> ComplexArray:
@@ -111,7 +111,7 @@ class Samples:
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Segments that edges of sheets draw on the pixels.
+    """Edges of wavefronts as line segments on the pixels.
 
     Attributes
     ----------
@@ -132,7 +132,7 @@ class Edges:
 
 
 def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
-    """Which segments cross which pixels.
+    """Pixels that each segment crosses.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
 
 
 def samples(order: npt.NDArray[np.int64], top: int, cuts: Edges | None = None) -> Samples:
-    """Points of a band of pixels: Gauss points, or, where edges cross, points of the pieces.
+    """Sample points of a band of pixels: Gauss points, or points of the pieces where edges cross.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The light of each arm on the pixels of an interferometer, from traced paths."""
+"""Light of each arm on the pixels of an interferometer, from traced paths."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fringetrace.tracing import Paths
 
 
 def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> ComplexArray:
-    """Mean fields on the pixels, one for each count of a mark.
+    """Mean fields on the pixels, one per count of a mark.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> Comp
 
 
 def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
-    """Mean over each pixel of E_m conj(E_n), for the light of each count of a mark, by the wavefront method.
+    """Mutual intensity of the counts of a mark, averaged over each pixel, by the wavefront method.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float) -> Complex
 
 
 def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
-    """Fields by count of a mark as sums of rays, each at the centre of its part of a pixel, see `centred`.
+    """Fields by count of a mark as ray sums, each ray at the centre of its part of a pixel, see `centred`.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
 
 
 def add_orders(one: ComplexArray, other: ComplexArray, axes: int = 1) -> ComplexArray:
-    """Sum of two arrays of light that may have different numbers of counts along their first axes.
+    """Sum of two arrays of light with different numbers of counts along their first axes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The interferometer: a scene, its beam, its CCD and its arms; what is traced, recorded and found with it."""
+"""Interferometer: a scene with beam, CCD and arms; traced once, then recorded at any wavelength."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Interferometer:
-    """An interferometer: a scene lit by one beam, seen by one CCD, with a reference arm and a sample's arm.
+    """Interferometer: a scene lit by one beam, seen by one CCD, with a reference and a sample arm.
 
     It is traced once; wavelengths and phase steps then re-use the paths. Where media bend or split light
     another way at another wavelength, it is traced once a wavelength (the last one is kept): `traced` says
@@ -81,7 +81,7 @@ class Interferometer:
 
     @property
     def traced(self) -> tuple[float | None, ...]:
-        """Wavelengths (metres) that it has been traced at, one after the other; None: one trace for all."""
+        """Wavelengths (metres) of the traces so far; None: one trace for all wavelengths."""
         return tuple(self.derived.get("traced", ()))
 
     def trace(
@@ -91,7 +91,7 @@ class Interferometer:
         progress: Progress | None = None,
         threads: int | None = None,
     ) -> Paths:
-        """All paths from the beam, traced at the first call and kept.
+        """Trace all paths at the first call, and keep them.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class Interferometer:
         return served
 
     def sampled(self, shape: tuple[int, int], wavelength: float | None = None) -> Paths:
-        """Paths of a coarser grid of rays over the same beam, with their polylines, to look at.
+        """Recorded paths of a coarser ray grid over the same beam, for drawing.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class Interferometer:
         )  # fmt: skip
 
     def shut(self, arm: str) -> Interferometer:
-        """The same interferometer with a black shutter in one arm, where its light ends.
+        """The interferometer with a shutter in one arm, whose light ends there.
 
         Parameters
         ----------
@@ -166,7 +166,7 @@ class Interferometer:
         return replace(self, scene=replace(self.scene, surfaces=tuple(surfaces)))
 
     def reach(self, wavelength: float) -> float:
-        """Largest difference between the optical paths of any light on the CCD.
+        """Largest optical path difference between any light on the CCD.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class Interferometer:
         return float(np.ptp(length)) if len(length) else 0.0
 
     def spectrum(self, light: Light) -> Spectrum:
-        """The wavelengths that stand for light.
+        """Discrete spectrum that represents the light.
 
         Parameters
         ----------
@@ -201,7 +201,7 @@ class Interferometer:
         return Spectrum(np.array([checked_wavelength(light)]), np.ones(1))
 
     def fields(self, wavelength: float) -> ComplexArray:
-        """Mean fields on the pixels, one for each count of the reference's mark.
+        """Mean fields on the pixels, one per count of the reference's mark.
 
         Parameters
         ----------
@@ -221,7 +221,7 @@ class Interferometer:
         return self._kept(wavelength, "fields", find)
 
     def mutual(self, light: Light) -> ComplexArray:
-        """Mutual intensities on the pixels of the light with m and n counts of the reference's mark.
+        """Mutual intensities on the pixels of light with m and n counts of the reference's mark.
 
         Parameters
         ----------
@@ -263,7 +263,7 @@ class Interferometer:
     def stream_fields(
         self, wavelength: float, *, progress: Progress | None = None, threads: int | None = None
     ) -> ComplexArray:
-        """`fields` by ray sum, while tracing: no path is kept, so memory does not grow with the rays.
+        """Fields by ray sum while tracing; memory does not grow with the number of rays.
 
         Parameters
         ----------
@@ -330,7 +330,7 @@ class Interferometer:
         return np.sqrt(image) if modulus else image
 
     def phase_steps(self, light: Light, steps: int = 4) -> FloatArray:
-        """Frames of a phase-stepped recording: frame k adds 2 pi k / steps to the reference.
+        """Phase-stepped frames: frame k adds 2 pi k / steps to the phase of the reference.
 
         Parameters
         ----------
@@ -356,11 +356,11 @@ class Interferometer:
         return self._kept(light, f"{steps} steps", frames).copy()
 
     def carrier(self, wavelength: float) -> FloatArray:
-        """Phase of the tilted reference wave over the pixels, see `Arms.carrier`: (rows, columns) float64."""
+        """Carrier phase of the tilted reference wave, see `Arms.carrier`: (rows, columns) float64."""
         return self.arms.carrier(self.ccd, wavelength)
 
     def wrapped(self, wavelength: float, steps: int = 4) -> FloatArray:
-        """Phase by which the reference leads the sample, from phase-stepped frames, wrapped.
+        """Wrapped phase of the reference relative to the sample, from phase-stepped frames.
 
         Parameters
         ----------
@@ -375,7 +375,7 @@ class Interferometer:
         return wrapped_phase(self.phase_steps(wavelength, steps), self.mutual(wavelength))
 
     def path_difference(self, wavelength: float, steps: int = 4) -> FloatArray:
-        """Optical path that the sample adds to its arm: phase steps, carrier off, unwrapped.
+        """Optical path that the sample adds to its arm, from phase steps, unwrapped.
 
         Parameters
         ----------

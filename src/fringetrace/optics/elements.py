@@ -90,7 +90,7 @@ class Element(Protocol):
 
     @property
     def waves(self) -> Waves:
-        """What becomes of plane waves: they stay plane, get curved, or are torn."""
+        """Effect on plane waves: they stay plane, get curved, or are torn."""
 
     @property
     def branches(self) -> int:

@@ -192,7 +192,7 @@ class PhasePlate:
 
     @property
     def waves(self) -> Waves:
-        """What becomes of plane waves: pixels tear them, smooth maps curve them."""
+        """Effect on plane waves: pixels tear them, smooth maps curve them."""
         return "torn" if isinstance(self.relief, PixelRelief) else "curved"
 
     @property

@@ -75,7 +75,7 @@ class Surface:
 
     @property
     def element(self) -> Element | None:
-        """The thin element that it is, if it is one."""
+        """Thin element of the surface, or None."""
         return cast("Element", self.interface) if hasattr(self.interface, "act") else None
 
     def _check_media(self) -> None:

@@ -1,4 +1,4 @@
-"""The pixel CCD: its plane, where rays cross it, pixel coordinates and pixel centres."""
+"""Pixel CCD: its plane, pixel coordinates and pixel centres."""
 
 from __future__ import annotations
 

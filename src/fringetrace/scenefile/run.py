@@ -47,7 +47,7 @@ class Run:
 
     @property
     def bench(self) -> Interferometer | None:
-        """The ready bench, if it is one."""
+        """The interferometer, if the setup is one."""
         return None if self.experiment.bench is None else self.experiment.bench.bench
 
     @property

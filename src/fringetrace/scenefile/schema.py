@@ -264,6 +264,6 @@ class Recipe:
 
     @functools.cached_property
     def bench(self) -> Interferometer:
-        """The bench."""
+        """Build the interferometer."""
         bench: Interferometer = call(kinds([Interferometer])[self.name], self.arguments)
         return bench

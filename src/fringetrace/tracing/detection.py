@@ -42,7 +42,7 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
 
 
 def components(paths: Paths, ccd: CCD) -> ComplexArray:
-    """Field that each path brings to a CCD.
+    """Field components of each path on a CCD.
 
     Parameters
     ----------

@@ -373,7 +373,7 @@ def _summed(counts: Sequence[npt.NDArray[np.int64] | None]) -> npt.NDArray[np.in
 
 
 def join(parts: Iterable[Paths]) -> Paths:
-    """Paths of consecutive rays of one source as one table.
+    """Concatenate paths of consecutive rays of one source.
 
     Parameters
     ----------

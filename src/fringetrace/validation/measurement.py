@@ -142,7 +142,7 @@ def _piston(differences: FloatArray, wavelength: float) -> float:
 def measure_height(
     bench: Interferometer, truth: FloatArray, wavelength: float, steps: int = 4
 ) -> Measurement:
-    """Record phase-stepped frames on a bench, find the height, and compare it with the truth.
+    """Measure a sample: record phase-stepped frames, compute the height, compare it with the mesh.
 
     Parameters
     ----------

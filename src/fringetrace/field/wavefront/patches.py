@@ -51,7 +51,7 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class PatchCells:
-    """A sheet's cells as the kernels read them, see `raster_kernels`; for `place` see `leaved`."""
+    """Cells of a wavefront in the form that the kernels read; for `place` see `leaved`."""
 
     coefficients: FloatArray
     leaves: FloatArray
@@ -77,7 +77,7 @@ class PatchCells:
 
     @cached_property
     def folds(self) -> bool:
-        """Whether there are folds: then the field depends on the wavelength by more than the phase."""
+        """Whether there are folds, where the field depends on the wavelength beyond its phase."""
         from fringetrace.field.wavefront.raster_kernels import SIGN
 
         return bool(self.crossed.any() or (self.leaves[:, SIGN] == 0.0).any())
@@ -285,7 +285,7 @@ def leaved(
     lines: FloatArray,
     ccd: CCD,
 ) -> PatchCells:
-    """PatchCells and their leaves.
+    """Patch cells with their quadtree leaves.
 
     Parameters
     ----------

@@ -224,7 +224,7 @@ def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64
 def find_contributions(
     wave: Wave, region: Region, beam: Beam, points: Samples, slope: FloatArray
 ) -> FloatArray:
-    """What a plane wave brings to sample points; exact but for rounding.
+    """Contributions of a plane wave at sample points, exact but for rounding.
 
     Parameters
     ----------

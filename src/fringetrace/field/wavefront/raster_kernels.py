@@ -174,7 +174,7 @@ def gradient(cells, cell, s, t):
 
 @jit
 def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y, slope):
-    """What regular leaves bring to the sample points of a band of pixels that begins at row `top`.
+    """Contributions of regular leaves at the sample points of a band of pixels from row `top` on.
 
     A row for each: the number of the point, the optical path, real and imaginary part of each component
     of the amplitude. `folded` marks cells in which J changes its sign, `turns` has their caustics passed
@@ -224,7 +224,7 @@ def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, 
 
 @jit
 def add_waves(rows, begin, component, period, group, factor, field):
-    """Add waves at a wavelength to the fields of their groups; `rows` as `leaf_contributions` has them.
+    """Add waves at a wavelength to the fields of their groups; `rows` as in `leaf_contributions`.
 
     Those of wave w are rows begin[w] to begin[w + 1]; they are multiplied by factor[w].
     """
@@ -248,7 +248,7 @@ def plane_wave_contributions(
     inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, first,
     x, y, where_x, where_y, shape, slope, pixels,
 ):  # fmt: skip
-    """What a plane wave brings to the sample points that its region of the beam reaches.
+    """Contributions of a plane wave at the sample points that its region of the beam reaches.
 
     (s, t) = inverse (point - origin); the path at the origin is `path`, its gradient `gradient`.
     `kind` of each cell from (low_s, low_t) on: 0 dark, 1 lit, 2 in pieces, those of the cell from

@@ -1,7 +1,7 @@
 """How far rays can be believed, and whether lattices explain a peacock's colours: tables and figures.
 
-python benchmarks/rigorous.py           print the tables
-python benchmarks/rigorous.py --write   and write them, with the figures, into docs/rigorous.md
+python docs/figures/rigorous.py           print the tables
+python docs/figures/rigorous.py --write   and write them, with the figures, into docs/rigorous.md
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from fringetrace.rigorous.cylinder_gratings import reflectance_spectrum
 from fringetrace.rigorous.cylinders import Cylinders, amplitude, differential_width, scatter
 from fringetrace.rigorous.cylindrical_waves import CONDUCTOR
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 from rods import FEATHERS, feather, keratin, melanin
 
 PAGE = pages.DOCS / "rigorous.md"

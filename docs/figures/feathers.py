@@ -1,7 +1,7 @@
 """Beyond the study: matter, true cylinders, counts and disorder, traced, beside the rigorous answer.
 
-python benchmarks/feathers.py            print
-python benchmarks/feathers.py --write    and put figure and table into docs/study.md
+python docs/figures/feathers.py            print
+python docs/figures/feathers.py --write    and put figure and table into docs/study.md
 """
 
 from __future__ import annotations
