@@ -85,7 +85,7 @@ def test_a_feather_by_rigorous_methods(feathers, tmp_path, capsys, monkeypatch):
         "lattice", "--columns", "3", "--rows", "2", "--pitch", "150 nm", "--arrangement", "square", *SHORT,
     ]  # fmt: skip
     given += ["--rod", "melanin", "--host", "1.55", "--cortex", "100 nm", "--channel", "10 nm"]
-    rods = [*given, "--method", "rods", "--polarisation", "H", "--out", str(tmp_path / "rods")]
+    rods = [*given, "--method", "rods", "--polarisation", "p", "--out", str(tmp_path / "rods")]
     assert command.main(rods) == 0
     assert "not told by this method" in capsys.readouterr().out
     layered = [*given, "--method", "multilayer", "--measured", feathers, "--out", str(tmp_path / "layers")]

@@ -1,7 +1,7 @@
 """Rigorous scattering by parallel circular cylinders: cylindrical waves and multiple scattering.
 
 Everything lies in the plane across the cylinders, x and y; light travels in that plane. Polarisation
-``"E"`` has the electric field along the cylinders, ``"H"`` the magnetic field; that field component is
+``"s"`` has the electric field along the cylinders, ``"p"`` the magnetic field; that field component is
 the wave u. Outside a cylinder j, with polar coordinates about its centre,
 
     u = sum_n [a_jn J_n(k r) + b_jn H_n(k r)] exp(i n phi),    b_jn = S_jn a_jn,
@@ -21,10 +21,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole
+from fringetrace.optics import Polarisation
 from fringetrace.rigorous.cylindrical_waves import (
     CONDUCTOR as CONDUCTOR,
     Index,
-    Polarisation,
     boundary,
     checked_index,
     damped,
@@ -97,7 +97,7 @@ class Scattered:
     cylinders : Cylinders
     wavelength : float, metres
         In vacuum.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     angle : (q,) float64, radians
         Where the incident waves travel to, from +x towards +y.
     exciting, outgoing : (q, n, 2 N + 1) complex128
@@ -137,7 +137,7 @@ def scattering_coefficients(
         n + i kappa; `CONDUCTOR` for a perfect conductor.
     host : float or array
         Refractive index around.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     orders : int
         N.
 
@@ -164,7 +164,7 @@ def efficiencies(
 
 
 def scatter(
-    cylinders: Cylinders, wavelength: float, angle: ArrayLike = 0.0, polarisation: Polarisation = "E",
+    cylinders: Cylinders, wavelength: float, angle: ArrayLike = 0.0, polarisation: Polarisation = "s",
     orders: int | None = None,
 ) -> Scattered:  # fmt: skip
     """Scattering of plane waves by a cluster of cylinders, with multiple scattering.
@@ -179,7 +179,7 @@ def scatter(
         In vacuum.
     angle : float or (q,), radians
         Where the waves travel to, from +x towards +y.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     orders : int, optional
         N; by default `truncation` of the largest cylinder.
 
@@ -274,7 +274,7 @@ def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
     Returns
     -------
     (q, p) complex128
-        The electric ("E") or magnetic ("H") field along the cylinders, over the incident amplitude.
+        The electric ("s") or magnetic ("p") field along the cylinders, over the incident amplitude.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     k, cylinders = scattered.wavenumber, scattered.cylinders

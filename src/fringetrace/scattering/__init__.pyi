@@ -17,4 +17,4 @@ from .goniometer import (
 )
 from .illumination import Illumination as Illumination, footprint as footprint
 from .rod_lattice import RodLattice as RodLattice
-from .rod_studies import Polarised as Polarised, cluster as cluster, specular as specular, study as study
+from .rod_studies import cluster as cluster, specular as specular, study as study

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from fringetrace.core import (
-    ROUNDED,
     ComplexArray,
     FloatArray,
     checked_direction,
     checked_vector,
-    filled,
     frame,
 )
+from fringetrace.optics import checked_jones
 from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive, checked_size
 
 
@@ -60,17 +58,6 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
     tuple of str
     """
     return (names,) if isinstance(names, str) else tuple(names)
-
-
-def _checked_jones(value: Any) -> ComplexArray:
-    try:
-        vector: ComplexArray = filled(value, np.complex128).copy()
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
-    size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
-    if not (np.isfinite(size) and size > 0.0):
-        raise ValueError(f"Beam polarisation: expected a Jones vector of two numbers, got {value!r}")
-    return vector if abs(size - 1.0) <= ROUNDED else vector / size
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +111,7 @@ class Beam:
             raise TypeError(f"Beam profile: expected None or a function of (x, y), got {self.profile!r}")
         object.__setattr__(self, "passes", as_names(self.passes))
         if self.polarisation is not None:
-            object.__setattr__(self, "polarisation", _checked_jones(self.polarisation))
+            object.__setattr__(self, "polarisation", checked_jones(self.polarisation, "Beam"))
 
     @property
     def area(self) -> float:
