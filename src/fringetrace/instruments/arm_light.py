@@ -7,7 +7,7 @@ import numpy as np
 from fringetrace.core import ComplexArray
 from fringetrace.field import centred, chosen, complex_field, mutual_intensity
 from fringetrace.instruments.arms import Mark
-from fringetrace.scene import Beam
+from fringetrace.scene import Beam, Spectrum
 from fringetrace.tracing import Paths
 
 
@@ -33,20 +33,22 @@ def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> Comp
     return _padded(fields, 1)
 
 
-def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
+def arm_mutual_intensity(paths: Paths, mark: Mark, light: float | Spectrum) -> ComplexArray:
     """Mutual intensity of the counts of a mark, averaged over each pixel, by the wavefront method.
 
     Parameters
     ----------
-    paths, mark, wavelength
+    paths, mark
         See `arm_fields`.
+    light : float or Spectrum
+        A wavelength in metres, or several at which light goes the same way.
 
     Returns
     -------
     (n, n, rows, columns) complex128, n at least 2
         Summed over the components of polarised light.
     """
-    return _padded(mutual_intensity(paths, wavelength, groups=mark.count(paths), method="wavefront"), 2)
+    return _padded(mutual_intensity(paths, light, groups=mark.count(paths), method="wavefront"), 2)
 
 
 def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:

@@ -243,6 +243,9 @@ class Interferometer:
                 return products(self.fields(light))
             return arm_mutual_intensity(paths, self.arms.reference, light)
         spectrum = self.spectrum(light)
+        paths = self.trace(float(spectrum.wavelengths[0]))
+        if needs(self.scene) is None and chosen(paths, self.method) == "wavefront":
+            return arm_mutual_intensity(paths, self.arms.reference, spectrum)
         total = np.zeros((2, 2, *self.ccd.shape), dtype=np.complex128)
         for wavelength, share in zip(spectrum.wavelengths.tolist(), spectrum.weights, strict=True):
             total = add_orders(share * self._mutual(wavelength), total, axes=2)
