@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole, short_repr
 from fringetrace.geometry import check_circles_apart
 from fringetrace.optics import Polarisation
 from fringetrace.rigorous.cylindrical_waves import (
@@ -61,6 +61,8 @@ class Cylinders:
     index: Index | Sequence[Index]
     host: Index = 1.0
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         centres = np.atleast_2d(np.asarray(self.centres, np.float64))
         if centres.ndim != 2 or centres.shape[1] != 2 or len(centres) == 0:
@@ -88,6 +90,9 @@ class Widths(NamedTuple):
     scattering: FloatArray
     absorption: FloatArray
 
+    def __repr__(self) -> str:
+        return short_repr(self)
+
 
 @dataclass(frozen=True)
 class Scattered:
@@ -111,6 +116,8 @@ class Scattered:
     angle: FloatArray
     exciting: ComplexArray
     outgoing: ComplexArray
+
+    __repr__ = short_repr
 
     @property
     def wavenumber(self) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import FloatArray, checked_length
+from fringetrace.core import FloatArray, checked_length, short_repr
 from fringetrace.geometry import Cylinder, Mesh, check_circles_apart, plate, rod_lattice
 from fringetrace.optics import VACUUM, Absorber, Dielectric, Mirror, as_material
 from fringetrace.scene import Scene, Surface
@@ -78,6 +78,8 @@ class RodLattice:
     cortex: float = 0.0
     channel: float | None = None
     exact: bool = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if self.arrangement not in ARRANGEMENTS:
