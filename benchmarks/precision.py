@@ -48,7 +48,7 @@ def main() -> None:
             f"{run.waves:10.1e} waves{run.irradiance:10.1e}",
             flush=True,
         )
-    table = work_precision.table(done)
+    table = work_precision.markdown_table(done)
     print(table)
     if "--write" in sys.argv[1:]:
         views.save(views.comparison(work_precision.panels(done)), pages.ACCURACY.parent / PICTURE)

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 import fringetrace as ft
 from fringetrace import nm
-from fringetrace.rigorous.cylinder_gratings import spectrum
+from fringetrace.rigorous.cylinder_gratings import reflectance_spectrum
 from fringetrace.rigorous.cylinders import Cylinders, amplitude, differential_width, scatter
 from fringetrace.rigorous.cylindrical_waves import CONDUCTOR
 
@@ -124,8 +124,10 @@ def peacock_table():
     several = {**FEATHERS, "brown, no cortex": thin, "brown, cortex 200": thick}
     for name, numbers in several.items():
         lattice = feather(*numbers)
-        curves[name] = [spectrum(lattice, WAVELENGTHS, math.radians(a)).reflectance for a in ANGLES]
-        flat = spectrum(lattice, WAVELENGTHS, method="multilayer").reflectance
+        curves[name] = [
+            reflectance_spectrum(lattice, WAVELENGTHS, math.radians(a)).reflectance for a in ANGLES
+        ]
+        flat = reflectance_spectrum(lattice, WAVELENGTHS, method="multilayer").reflectance
         cells = [", ".join(f"{w} ({h:.2f})" for w, h in bands(curve)) for curve in [*curves[name], flat]]
         period, pitch, _, rod, _, layers = numbers
         rows.append(f"| {name}: {period}, {pitch}, {rod:.3g}, {layers} | " + " | ".join(cells) + " |")

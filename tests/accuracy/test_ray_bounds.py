@@ -120,5 +120,5 @@ def test_paths_on_a_ccd_and_paths_that_split():
 
 def test_paths_have_to_be_recorded():
     paths = ft.trace(discs(20 * nm), ft.Rays([(0, 0, 0)], [(1, 0, 0)]), max_bounces=2)
-    with pytest.raises(ValueError, match="contacts: expected paths traced with record=True"):
+    with pytest.raises(ValueError, match="expected paths traced with record=True"):
         ft.bounds(paths)

@@ -9,14 +9,14 @@ import xarray
 import fringetrace as ft
 from fringetrace.cli import brdf_commands, command
 from fringetrace.core import sweeps
-from fringetrace.scattering.rod_lattice import Lattice
+from fringetrace.scattering.rod_lattice import RodLattice
 
 SHORT = ["--angles", "20 deg", "2", "--wavelengths", "400 nm", "600 nm", "5"]
 
 
 @pytest.fixture
 def rods(tmp_path):
-    ft.meshes.save(Lattice(3, 2).mesh, tmp_path / "rods.ply", "um")
+    ft.meshes.save(RodLattice(3, 2).mesh, tmp_path / "rods.ply", "um")
     return tmp_path / "rods.ply"
 
 

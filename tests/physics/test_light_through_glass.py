@@ -17,7 +17,7 @@ from fringetrace.geometry import forms, shapes
 from fringetrace.optics.films import Film
 from fringetrace.optics.interfaces import reflect
 from fringetrace.tracing.rewavelength import at_wavelength
-from fringetrace.tracing.segments import indices
+from fringetrace.tracing.segments import Segments
 
 HENE = cases.HENE
 # Means over pixels are good to 1e-6 of the field.
@@ -319,7 +319,7 @@ def test_indices_of_recorded_paths():
     """On each segment that of the medium; in an absorbing one that of the wave."""
     scene = wedge(1.5 + 0.3j, 1 * um, 0.5)
     paths = ft.trace(scene, lit(), screen(), wavelength=HENE, record=True).detected
-    along = indices(paths)
+    along = Segments.of(paths).index
     once = paths.bounces == 2
     np.testing.assert_allclose(along[once][:, [0, 2]], 1.0, rtol=0, atol=1e-14)
     kz = np.sqrt((1.5 + 0.3j) ** 2 - math.sin(0.5) ** 2)

@@ -4,55 +4,42 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, unit
-from fringetrace.geometry import dot, standoff
+from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.geometry import standoff
 from fringetrace.scene import Beam
-from fringetrace.tracing import (
-    EXTENDED,
-    Fate,
-    Met,
-    Paths,
-    corners,
-    indices,
-    legs,
-    level,
-    materials,
-    met,
-    normals,
-    shifted,
-)
+from fringetrace.tracing import EXTENDED, Fate, Paths, Segments, SurfaceHits, path_change, surface_hits
 
 
-def off(bounces: Met) -> Array:
+def hit_offsets(hits: SurfaceHits) -> Array:
     """Rounding of the hits: how far each stands off its facet, or off the form behind it.
 
     Parameters
     ----------
-    bounces : Met
+    hits : SurfaceHits
 
     Returns
     -------
     (n, 3) longdouble, metres
         Along the normal of the surface.
     """
-    corner = corners(bounces).astype(EXTENDED)
+    corner = hits.corners.astype(EXTENDED)
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.sqrt((normal**2).sum(axis=1))[:, None]
-    height = ((bounces.point - corner[:, 0]) * normal).sum(axis=1)
-    on = bounces.formed
+    height = ((hits.point - corner[:, 0]) * normal).sum(axis=1)
+    on = hits.formed
     if on.any():
-        value, gradient, _ = level(bounces, on, np.asarray(normal[on], dtype=np.float64))
+        value, gradient, _ = hits.level(on, np.asarray(normal[on], dtype=np.float64))
         normal[on] = gradient / dot(gradient, gradient)[:, None]
         height[on] = value
     return np.asarray(height[:, None] * normal)
 
 
-def flattened(bounces: Met) -> tuple[FloatArray, FloatArray]:
-    """What facets leave out of the smooth surface that they may stand for; see `facets.standoff`.
+def flattening(hits: SurfaceHits) -> tuple[FloatArray, FloatArray]:
+    """What facets leave out of the smooth surface that they may stand for; see `geometry.standoff`.
 
     Parameters
     ----------
-    bounces : Met
+    hits : SurfaceHits
 
     Returns
     -------
@@ -61,40 +48,40 @@ def flattened(bounces: Met) -> tuple[FloatArray, FloatArray]:
     (n, 3) float64
         The facet's normal less that of the smooth surface.
     """
-    height, lean = np.zeros((len(bounces.face), 3)), np.zeros((len(bounces.face), 3))
-    plain = ~bounces.formed
+    height, lean = np.zeros((len(hits.face), 3)), np.zeros((len(hits.face), 3))
+    plain = ~hits.formed
     if plain.any():
-        mesh, face = bounces.surface.mesh, bounces.face[plain]
+        mesh, face = hits.surface.mesh, hits.face[plain]
         corner = mesh.vertices[mesh.faces[face]]
         normal = unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
-        above, lean[plain] = standoff(mesh.vertices, mesh.faces, face, bounces.point[plain])
+        above, lean[plain] = standoff(mesh.vertices, mesh.faces, face, hits.point[plain])
         height[plain] = -above[:, None] * normal
     return height, lean
 
 
-def curvature(bounces: Met) -> FloatArray:
+def curvature(hits: SurfaceHits) -> FloatArray:
     """How the normal of the surface turns from place to place: dn = C dp; 0 on facets.
 
     Parameters
     ----------
-    bounces : Met
+    hits : SurfaceHits
 
     Returns
     -------
     (n, 3, 3) float64, 1/m
-        Of the normal that `normals` gives.
+        Of `SurfaceHits.normal`.
     """
-    bend = np.zeros((len(bounces.face), 3, 3))
-    on = bounces.formed
+    bend = np.zeros((len(hits.face), 3, 3))
+    on = hits.formed
     if not on.any():
         return bend
-    normal = normals(bounces)[on]
+    normal = hits.normal[on]
     least = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
     first = unit(np.cross(normal, least))
     second = np.cross(normal, first)
-    steep = np.linalg.norm(level(bounces, on, first)[1], axis=1)
+    steep = np.linalg.norm(hits.level(on, first)[1], axis=1)
     ways = (first, second, unit(first + second))
-    along, across, between = (level(bounces, on, way)[2] / steep for way in ways)
+    along, across, between = (hits.level(on, way)[2] / steep for way in ways)
     twist = between - 0.5 * (along + across)
     bend[on] = np.einsum("n,ni,nj->nij", along, first, first)
     bend[on] += np.einsum("n,ni,nj->nij", across, second, second)
@@ -103,16 +90,8 @@ def curvature(bounces: Met) -> FloatArray:
     return bend
 
 
-def _lengths(paths: Paths) -> FloatArray:
-    """Optical paths, without what thin elements add."""
-    if paths.lengths is None or not any(hasattr(s.interface, "act") for s in paths.scene.surfaces):
-        return paths.length
-    known = [complex(m.index(paths.wavelength or 1.0)).real for m in materials(paths.scene)]
-    return np.asarray(paths.lengths @ np.array(known), dtype=np.float64)
-
-
 def rounding(paths: Paths) -> FloatArray:
-    """Error of the optical path of each path by the rounding of float64, measured.
+    """Rounding error of the optical path of each path, measured.
 
     The recorded points are compared with the facets and forms that they should lie on, and the
     optical path with the way from point to point, in longer numbers. A path whose points lie on the
@@ -130,11 +109,13 @@ def rounding(paths: Paths) -> FloatArray:
         Optical path less the true one to the same place. Where numbers have no more digits than
         float64 (some machines), or behind a form, as large as the roundings of this comparison.
     """
-    length, direction = legs(paths)
-    index = indices(paths)
-    error = _lengths(paths).astype(EXTENDED) - (length * index).sum(axis=1)
-    for bounces in met(paths):
-        error += shifted(paths, bounces, off(bounces), direction)
+    segments = Segments.of(paths)
+    direction, index = segments.direction, segments.index
+    error = (
+        paths.length.astype(EXTENDED) - segments.advance.sum(axis=1) - (segments.length * index).sum(axis=1)
+    )
+    for hits in surface_hits(paths):
+        error += path_change(segments, hits, hit_offsets(hits))
     assert paths.points is not None
     if isinstance(paths.source, Beam):  # the phase is 0 on its rectangle
         start = paths.points[:, 0].astype(EXTENDED) - paths.source.centre

@@ -1,4 +1,4 @@
-"""How well single rays are known: rounding carried from bounce to bounce, along recorded paths."""
+"""Error bounds of single rays: rounding propagated from bounce to bounce along recorded paths."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CHUNK = 1 << 14
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """How far rounding may have led each path from the ray that was asked for.
+    """Error bounds of single rays: position, direction and optical path.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Bounds:
 
 
 def bounds(paths: Paths) -> Bounds:
-    """Carry the rounding of float64 through the bounces of each path.
+    """Propagate float64 rounding errors through the bounces of each path.
 
     Errors of position, direction and optical path are carried as a covariance by the linear map of
     each segment and bounce: dp' = dp + L dd, onto the surface along the ray; off a mirror
@@ -83,11 +83,12 @@ def bounds(paths: Paths) -> Bounds:
 
 def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
     """`Bounds` of some paths. Rows and columns of the covariance: position, direction, optical path."""
-    from fringetrace.tracing import indices, legs
+    from fringetrace.tracing import Segments
 
     normal, bend = _tables(paths)
-    index = indices(paths)
-    length, direction = (np.asarray(table, dtype=np.float64) for table in legs(paths))
+    segments = Segments.of(paths)
+    index = segments.index
+    length, direction = segments.length.astype(np.float64), segments.direction.astype(np.float64)
     assert paths.points is not None
     size = np.nanmax(np.abs(paths.points), axis=(1, 2)) * ROUNDING
     spread = np.zeros((len(paths), 7, 7))
@@ -121,13 +122,13 @@ def _carried(paths: Paths) -> tuple[FloatArray, FloatArray, FloatArray]:
 def _tables(paths: Paths) -> tuple[FloatArray, FloatArray]:
     """Normal (m, b, 3) and curvature (m, b, 3, 3) at each bounce; at least one column."""
     from fringetrace.accuracy.path_errors import curvature
-    from fringetrace.tracing import met, normals
+    from fringetrace.tracing import surface_hits
 
     depth = max(1, int(paths.bounces.max(initial=0)))
     normal, bend = np.zeros((len(paths), depth, 3)), np.zeros((len(paths), depth, 3, 3))
-    for bounces in met(paths):
-        normal[bounces.path, bounces.bounce] = normals(bounces)
-        bend[bounces.path, bounces.bounce] = curvature(bounces)
+    for hits in surface_hits(paths):
+        normal[hits.path, hits.hit] = hits.normal
+        bend[hits.path, hits.hit] = curvature(hits)
     return normal, bend
 
 

@@ -1,4 +1,4 @@
-"""Fused loops over pixels: their sample points, cut along edges where any cross them, and means over them.
+"""Compiled pixel quadrature: sample points, pixels cut along edges, and weighted means.
 
 Sample points are in compressed rows: those of pixel i of a band are first[i] to first[i + 1].
 """
@@ -11,15 +11,22 @@ from fringetrace.core import grown, jit, part
 
 
 @jit
-def average(first, weight, field, mean, mutual):
-    """Weighted means over the samples of each pixel of the fields, and of E_m conj(E_n)."""
-    groups = len(field)
-    for pixel in range(len(first) - 1):
-        for m in range(groups):
+def means(first, weight, field, mean):
+    """Weighted means over the samples of each pixel of the fields."""
+    for m in range(len(field)):
+        for pixel in range(len(first) - 1):
             total = 0.0j
             for k in range(first[pixel], first[pixel + 1]):
                 total += weight[k] * field[m, k]
             mean[m, pixel] = total
+
+
+@jit
+def products(first, weight, field, mutual):
+    """Weighted means over the samples of each pixel of E_m conj(E_n)."""
+    groups = len(field)
+    for pixel in range(len(first) - 1):
+        for m in range(groups):
             for n in range(m, groups):
                 real, imaginary = 0.0, 0.0
                 for k in range(first[pixel], first[pixel + 1]):
@@ -32,7 +39,7 @@ def average(first, weight, field, mean, mutual):
 
 @jit
 def lattice(order, columns, top, nodes, weights, first, x, y, weight):
-    """Gauss points of the pixels of a band: order[i] x order[i] of them in pixel i, none where it is 0.
+    """Gauss points of the pixels of a band: order[i] x order[i] in pixel i, none where it is 0.
 
     `nodes`, `weights` are tables by order, on [0, 1].
     """
@@ -82,7 +89,7 @@ CORNERS, PIECES = 32, 1024
 
 @part
 def clip(polygon, corners, a, b, c, sign, result):
-    """The part of a convex polygon where sign (a x + b y - c) >= 0; its corners."""
+    """Clip a convex polygon to the half-plane sign (a x + b y - c) >= 0; its corners."""
     count = 0
     for i in range(corners):
         j = i + 1 if i + 1 < corners else 0
@@ -101,7 +108,7 @@ def clip(polygon, corners, a, b, c, sign, result):
 
 @jit
 def shatter(x, y, size, lines, segments, polygons, corners):
-    """Cut a square by the lines of some segments; how many pieces."""
+    """Cut a square by the lines of segments; number of pieces."""
     for i in range(4):
         polygons[0, i, 0] = x + (size if i == 1 or i == 2 else 0.0)
         polygons[0, i, 1] = y + (size if i >= 2 else 0.0)
@@ -132,7 +139,7 @@ def shatter(x, y, size, lines, segments, polygons, corners):
 
 @jit
 def cut(pixels, parts, begin, lines, segments, columns, rule):
-    """Sample points of pixels that edges cross: columns x, y, weight, and a point sure of its side.
+    """Sample points of pixels that edges cross: columns x, y, weight, and a point certain to be on its side.
 
     Each pixel, in parts x parts squares, is cut by the lines of its segments into convex pieces,
     those into triangles with the points of `rule`: barycentric a, b, c and weight. Also returns how

@@ -9,8 +9,19 @@ from . import (
     polarisers as polarisers,
 )
 from .birefringent import ShearPlate as ShearPlate
-from .elements import Branch as Branch, Element as Element, Index as Index, Meeting as Meeting
-from .film_kernels import bare as bare, coated as coated, shares as shares, stacks as stacks
+from .elements import (
+    Branch as Branch,
+    Element as Element,
+    IncidentRays as IncidentRays,
+    RealIndex as RealIndex,
+)
+from .film_kernels import (
+    bare as bare,
+    coated as coated,
+    normal_part as normal_part,
+    shares as shares,
+    stacks as stacks,
+)
 from .films import Film as Film, coefficients as coefficients
 from .interfaces import (
     Absorber as Absorber,
@@ -19,7 +30,7 @@ from .interfaces import (
     Interface as Interface,
     Metal as Metal,
     Mirror as Mirror,
-    refracted as refracted,
+    refract as refract,
 )
 from .materials.material import Material as Material
 from .materials.named_materials import VACUUM as VACUUM, as_material as as_material

@@ -1,4 +1,4 @@
-"""What lights a sample under a goniometer: a rectangle of its plane, from any direction."""
+"""Illumination of a goniometer's sample: a plane wave over a rectangle, from any direction."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from fringetrace.scattering.detectors import sides, towards
 from fringetrace.scene import Beam, Scene
 from fringetrace.tracing import Rays, launch
 
-Source = Callable[[float, float], Beam | Rays]
+SourceFunction = Callable[[float, float], Beam | Rays]
 # None: light of one number a ray. A name, or amplitudes of s and p, one pair or one an incidence.
 Polarisation = str | npt.ArrayLike | None
 # Amplitudes of s and p; of several the powers' mean is taken.
@@ -23,7 +23,7 @@ NAMED = {"s": ((1, 0),), "p": ((0, 1),), "unpolarised": ((1, 0), (0, 1))}
 
 
 def states(polarisation: Polarisation, shape: tuple[int, int]) -> list[tuple[ComplexArray | None, ...]]:
-    """States of light whose powers make up a polarisation, for each incidence.
+    """Jones vectors whose powers make up a polarisation, for each incidence.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def states(polarisation: Polarisation, shape: tuple[int, int]) -> list[tuple[Com
     return [(one,) for one in np.broadcast_to(given, (*shape, 2)).reshape(-1, 2)]
 
 
-def worth(scene: Scene, wavelength: float) -> Validity:
-    """What rays are worth on the smallest part of a scene, taken for a rod; see `fringetrace.validity`.
+def scene_validity(scene: Scene, wavelength: float) -> Validity:
+    """Validity of ray optics for the smallest part of a scene, taken for a rod; see `fringetrace.validity`.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ def footprint(
     reach: float,
     jones: npt.ArrayLike | None = None,
 ) -> Rays:
-    """A plane wave whose rays cross the plane through the sample's centre in the same grid at any angle.
+    """Plane wave whose rays cross the plane through the sample's centre in the same grid at any angle.
 
     Parameters
     ----------
@@ -129,8 +129,8 @@ def footprint(
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
-    """A sample under a goniometer: what is lit, about which centre.
+class Illumination:
+    """Sample of a goniometer: its scene, the lit rectangle and the phase centre.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ class Setup:
     aperture: tuple[float, float] | None = None
     rays: tuple[int, int] = (256, 256)
     centre: npt.ArrayLike | None = None
-    source: Source | None = None
+    source: SourceFunction | None = None
 
     def __post_init__(self) -> None:
         low, high = self.bounds
@@ -170,12 +170,12 @@ class Setup:
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest corner of the box around the sample, (3,) float64, metres."""
+        """Bounding box of the sample, (3,) float64 lower and upper corner, metres."""
         boxes = np.stack([surface.mesh.bounds for surface in self.scene.surfaces])
         return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
     def light(self, theta: float, phi: float, jones: npt.ArrayLike | None = None) -> Beam | Rays:
-        """What falls on the sample from one direction.
+        """Light on the sample from one direction.
 
         Parameters
         ----------
@@ -202,7 +202,7 @@ class Setup:
         return footprint(theta, phi, self.aperture, self.rays, np.asarray(self.centre), reach, jones)
 
     def start(self, source: Beam | Rays, wavelength: float | None = None) -> float:
-        """Optical path of parallel light from its start to the plane through the centre, across it.
+        """Optical path of parallel light from its start to the plane through the centre, normal to it.
 
         Parameters
         ----------

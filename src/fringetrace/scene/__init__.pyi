@@ -1,4 +1,5 @@
-from .facet_groups import parted as parted
+from .coplanar import planes as planes
+from .facet_groups import group_facets as group_facets
 from .model import Scene as Scene, Surface as Surface
 from .sensor import CCD as CCD, pixel_centres as pixel_centres, pixels as pixels, screen as screen
 from .sensor_kernels import lands as lands, place as place

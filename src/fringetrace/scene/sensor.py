@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def pixels(ccd: CCD, point: FloatArray) -> FloatArray:
-    """CCD coordinates of points in its plane of focus.
+    """CCD coordinates (row, column) of points in its plane of focus.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def pixels(ccd: CCD, point: FloatArray) -> FloatArray:
 
 
 def screen(ccd: CCD) -> tuple[float, ...]:
-    """A CCD as the kernels read it: centre, normal, u, v, half width, half height, focus.
+    """Parameters of a CCD for the kernels: centre, normal, u, v, half width, half height, focus.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def screen(ccd: CCD) -> tuple[float, ...]:
 
 @dataclass(frozen=True, eq=False)
 class CCD:
-    """A rectangle of pixels that records what falls on its front.
+    """CCD: a rectangle of square pixels that records light on its front.
 
     Images are arrays [row, column] = [v, u], origin lower: u = normal x up is to the right of
     somebody who looks out of the chip along its normal, v is up. Light from behind passes.
@@ -104,12 +104,12 @@ class CCD:
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and height, metres."""
+        """Width and height of the CCD, metres."""
         return self.shape[1] * self.pitch, self.shape[0] * self.pitch
 
 
 def pixel_centres(shape: tuple[int, int], pitch: float) -> tuple[FloatArray, FloatArray]:
-    """Positions of pixels about the centre of their image.
+    """Positions of pixel centres relative to the centre of the image.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Compiled loops between rays and the CCD: whether a ray reaches it, where, and its sum on the pixels.
+"""Compiled intersection of rays with the CCD, and pixel coordinates.
 
 A `screen` is 15 floats in metres: centre, normal, u, v, half width, half height, focus.
 """
@@ -12,7 +12,7 @@ from fringetrace.core import jit, part
 
 @part
 def lands(screen, path, x, y, z, dx, dy, dz):
-    """Path to the CCD if a ray reaches its front within `path` metres, else infinity."""
+    """Path length to the CCD if a ray reaches its front within `path` metres, else infinity."""
     x, y, z = x - screen[0], y - screen[1], z - screen[2]
     facing = dx * screen[3] + dy * screen[4] + dz * screen[5]
     reach = -(x * screen[3] + y * screen[4] + z * screen[5]) / facing

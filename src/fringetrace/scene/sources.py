@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import ROUNDED, ComplexArray, FloatArray, checked_direction, checked_vector, frame
+from fringetrace.core import (
+    ROUNDED,
+    ComplexArray,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    filled,
+    frame,
+)
 from fringetrace.scene.planes import Axes, checked_grid, checked_positive, checked_size
 
 if TYPE_CHECKING:
@@ -17,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Gaussian beam profile, brightest at the centre: amplitude exp(-r^2 / waist^2).
+    """Gaussian beam profile: amplitude exp(-r^2 / waist^2).
 
     Parameters
     ----------
@@ -44,7 +52,7 @@ Profile = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Names of surfaces, given as one or as several.
+    """Tuple of surface names, from one name or several.
 
     Parameters
     ----------
@@ -59,7 +67,7 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
 
 def _checked_jones(value: Any) -> ComplexArray:
     try:
-        vector = np.array(value, dtype=np.complex128)
+        vector: ComplexArray = filled(value, np.complex128).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
     size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
@@ -70,7 +78,7 @@ def _checked_jones(value: Any) -> ComplexArray:
 
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """A collimated coherent beam: a plane wave, launched as a grid of parallel rays.
+    """Collimated coherent beam: a plane wave, launched as a grid of parallel rays.
 
     Parameters
     ----------
@@ -123,5 +131,5 @@ class Beam:
 
     @property
     def area(self) -> float:
-        """Area of the beam that one ray stands for, m^2."""
+        """Beam area per ray, m^2."""
         return self.size[0] * self.size[1] / (self.shape[0] * self.shape[1])

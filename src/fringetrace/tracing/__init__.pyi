@@ -1,20 +1,18 @@
-from . import detection as detection, segment_media as segment_media
-from .detection import along as along, landed as landed, project as project
+from . import detection as detection
+from .detection import components as components, landed as landed, project as project
 from .fates import DETECTED as DETECTED, Fate as Fate
 from .intersect.bodies import Float32 as Float32, float32_hits as float32_hits
-from .optics_table import constants as constants, materials as materials, needs as needs, plain as plain
+from .optics_table import constants as constants, needs as needs, plain as plain, scene_media as scene_media
 from .paths import Ledger as Ledger, Paths as Paths, join as join
+from .ray_query import retrace as retrace
 from .rays import Rays as Rays, launch as launch, launch_at as launch_at
 from .rewavelength import at_wavelength as at_wavelength
 from .segments import (
     EXTENDED as EXTENDED,
-    Met as Met,
-    corners as corners,
-    indices as indices,
-    legs as legs,
-    level as level,
-    met as met,
-    normals as normals,
+    Segments as Segments,
+    SurfaceHits as SurfaceHits,
+    surface_hits as surface_hits,
+    surface_phase as surface_phase,
 )
-from .sensitivity import leverage as leverage, shifted as shifted
+from .sensitivity import leverage as leverage, path_change as path_change
 from .tracer import stream as stream, trace as trace

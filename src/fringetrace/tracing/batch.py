@@ -13,7 +13,7 @@ from fringetrace.core import Array, ComplexArray, FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Tracks:
-    """What is known of paths under way as well as of those that have ended, one row each.
+    """Columns shared by paths under way and paths that have ended, one row each.
 
     `lost` is the power given off on the way, `serial` numbers the paths as they are born.
     """
@@ -28,13 +28,13 @@ class Tracks:
 
     @property
     def columns(self) -> tuple[Array, ...]:
-        """All columns, as the kernels take them."""
+        """All columns, in the order of the kernels."""
         return tuple(vars(self).values())
 
 
 @dataclass(frozen=True, eq=False)
 class Batch(Tracks):
-    """Rays under way, changed in place by the bounce passes. Lengths in metres.
+    """Rays under way, changed in place by the tracing loop. Lengths in metres.
 
     `state` has the columns that `kernels` names: origin, direction, normal of the face last left,
     optical path, distance of the start from that face's edge. `last` is the triangle last left
@@ -48,7 +48,7 @@ class Batch(Tracks):
 
 @dataclass(frozen=True, eq=False)
 class Ends(Tracks):
-    """Paths that have ended, and the reason."""
+    """Ended paths, and the reason."""
 
     origin: FloatArray
     direction: FloatArray
@@ -58,7 +58,7 @@ class Ends(Tracks):
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """What rays carry through matter, beside a batch or its ends, row by row.
+    """State of rays in matter, beside a batch or its ends, row by row.
 
     Attributes
     ----------
@@ -87,12 +87,12 @@ class Carried:
 
     @property
     def columns(self) -> tuple[Array, ...]:
-        """All columns, as the kernels take them."""
+        """All columns, in the order of the kernels."""
         return tuple(vars(self).values())
 
     @staticmethod
     def blank(rows: int, media: int, polarised: bool, fading: bool) -> Carried:
-        """Room for so many rows, not filled in."""
+        """Uninitialised table of so many rows."""
         return Carried(
             medium=np.empty(rows, dtype=np.int32),
             index=np.empty(rows),
@@ -104,11 +104,11 @@ class Carried:
         )
 
     def rows(self, which: Array | slice) -> Carried:
-        """Some rows."""
+        """Subset of the rows."""
         return Carried(*(column[which] if len(column) else column for column in vars(self).values()))
 
     def grown(self, rows: int) -> Carried:
-        """The same rows in arrays with room for more."""
+        """Larger table that starts with the same rows."""
         larger = Carried.blank(rows, self.lengths.shape[1], len(self.field) > 0, len(self.fade) > 0)
         for column, wider in zip(self.columns, larger.columns, strict=True):
             wider[: len(column)] = column
@@ -125,19 +125,19 @@ TYPES = {
 
 
 def blank(kind: type[Table], rows: int) -> Table:
-    """Room for so many rows, not filled in."""
+    """Uninitialised table of so many rows."""
     wide = {"origin": (rows, 3), "direction": (rows, 3), "came": (rows, 3), "state": (rows, 12)}
     names = [column.name for column in fields(kind)]
     return kind(**{name: np.empty(wide.get(name, rows), TYPES.get(name, np.float64)) for name in names})
 
 
 def part(table: Table, start: int, stop: int) -> Table:
-    """Views of some rows."""
+    """Views of a range of rows."""
     return type(table)(**{name: column[start:stop] for name, column in vars(table).items()})
 
 
 def grown(table: Table, rows: int) -> Table:
-    """The same rows in arrays with room for more."""
+    """Larger table that starts with the same rows."""
     larger = blank(type(table), rows)
     for name, column in vars(table).items():
         getattr(larger, name)[: len(column)] = column

@@ -1,4 +1,4 @@
-"""Where paths land: on a CCD that they were not traced onto, or beside one; components of their field."""
+"""Detection of paths on a CCD that they were not traced onto; field components of paths."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, frame
+from fringetrace.core import Array, ComplexArray, FloatArray, frame
 from fringetrace.scene import CCD
 from fringetrace.tracing.fates import Fate
 from fringetrace.tracing.paths import Paths
@@ -44,25 +44,26 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
     return rows, point, paths.length[rows] + reach[rows] * index
 
 
-def along(paths: Paths, axis: FloatArray) -> Paths:
-    """Paths whose amplitude is the field along an axis.
+def components(paths: Paths, ccd: CCD) -> ComplexArray:
+    """Field that each path brings to a CCD.
 
     Parameters
     ----------
     paths : Paths
-        Of light with a polarisation.
-    axis : (3,) float64, unit
+    ccd : CCD
 
     Returns
     -------
-    Paths
+    (1, m) complex128
+        The amplitude; of polarised light (3, m), its components along the CCD's columns, rows and normal.
     """
-    assert paths.field is not None
-    return replace(paths, amplitude=paths.field @ axis)
+    if paths.field is None:
+        return paths.amplitude[None]
+    return np.stack([paths.field @ axis for axis in ccd.axes])
 
 
 def project(paths: Paths, ccd: CCD) -> Paths:
-    """Let the light that left a scene fall on a CCD beyond it, without a new trace.
+    """Detect the light that left a scene on a CCD beyond it, without a new trace.
 
     Parameters
     ----------

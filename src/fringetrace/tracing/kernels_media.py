@@ -1,4 +1,4 @@
-"""Compiled loops where light meets matter: Snell, Fresnel, films, damping, the field as a vector.
+"""Compiled kernels of rays in matter: Snell, Fresnel, films, absorption, polarisation vectors.
 
 The counterpart of `bounces` for scenes with media. Amplitudes are those of power: |amplitude|^2 is what a
 ray carries. In an absorbing medium a ray has the complex wave vector k0 (index * direction + i fade), so
@@ -37,7 +37,7 @@ STRAIGHT = 1e-12
 
 @part
 def sideways(dx, dy, dz, nx, ny, nz):
-    """Unit vector across a ray and a normal (that of s light); across the ray alone where these agree."""
+    """Unit vector of s light, perpendicular to ray and normal; any across the ray at normal incidence."""
     x, y, z = dy * nz - dz * ny, dz * nx - dx * nz, dx * ny - dy * nx
     size = x * x + y * y + z * z
     if size < STRAIGHT * STRAIGHT:
@@ -51,35 +51,35 @@ def sideways(dx, dy, dz, nx, ny, nz):
 
 @part
 def split(ex, ey, ez, dx, dy, dz, sx, sy, sz):
-    """Parts of a field along s, and along p = d x s."""
+    """Field components along s, and along p = d x s."""
     px, py, pz = dy * sz - dz * sy, dz * sx - dx * sz, dx * sy - dy * sx
     return ex * sx + ey * sy + ez * sz, ex * px + ey * py + ez * pz
 
 
 @part
 def made(s, p, dx, dy, dz, sx, sy, sz):
-    """The field of two parts."""
+    """Field vector of its s and p components."""
     px, py, pz = dy * sz - dz * sy, dz * sx - dx * sz, dx * sy - dy * sx
     return s * sx + p * px, s * sy + p * py, s * sz + p * pz
 
 
 @part
 def power(field, polarised):
-    """What a ray carries; its field is a scalar and a vector, one of which is 0."""
+    """Power of a ray; its field is a scalar and a vector, one of which is 0."""
     scalar, ex, ey, ez = field
     return square(ex) + square(ey) + square(ez) if polarised else square(scalar)
 
 
 @part
 def damped(field, factor):
-    """A field times a factor."""
+    """Field multiplied by a factor."""
     scalar, ex, ey, ez = field
     return scalar * factor, ex * factor, ey * factor, ez * factor
 
 
 @part
 def bent(index, first, last, q1, q2, facing, d, f, n):
-    """Direction, real index and fade of the wave beyond a boundary: what runs along it stays the same.
+    """Refracted direction, real index and decay of the wave behind a boundary (Snell's law).
 
     `q1`, `q2` are the normal parts before and behind, in the sense of travel; `facing` the cosine.
     """
@@ -100,7 +100,7 @@ def bent(index, first, last, q1, q2, facing, d, f, n):
 
 @part
 def parted(field, d, h, t, n, rs, rp, ts, tp, polarised):
-    """The field that goes back along h, and that which goes on along t."""
+    """Reflected and transmitted field vectors, along the directions h and t."""
     scalar, ex, ey, ez = field
     if not polarised:
         return (scalar * rs, ex, ey, ez), (scalar * ts, ex, ey, ez)
@@ -113,7 +113,7 @@ def parted(field, d, h, t, n, rs, rp, ts, tp, polarised):
 
 @part
 def field_of(light, amplitude, row, polarised):
-    """The field of a row as a scalar and as a vector; one of the two is 0."""
+    """Field of a row as a scalar and as a vector; one of the two is 0."""
     field = light[4]
     if polarised:
         return 0j, field[row, 0], field[row, 1], field[row, 2]
@@ -122,7 +122,7 @@ def field_of(light, amplitude, row, polarised):
 
 @part
 def carry(light, amplitude, row, carried, polarised):
-    """Write the field of a row; where it is a vector, the amplitude is its size."""
+    """Write the field of a row; a vector's amplitude is its length."""
     field = light[4]
     amplitude[row], ex, ey, ez = carried
     if polarised:
@@ -132,7 +132,7 @@ def carry(light, amplitude, row, carried, polarised):
 
 @part
 def immerse(light, row, number, index, fades, fading):
-    """Write which medium a row is in, its real index there, how it fades."""
+    """Write the medium of a row, its real index and its decay."""
     medium, indices, fade = light[0], light[1], light[2]
     medium[row], indices[row] = number, index
     if fading:
@@ -141,7 +141,7 @@ def immerse(light, row, number, index, fades, fading):
 
 @part
 def fading_of(light, row, fading):
-    """How a row fades: imaginary part of its wave vector, over k0."""
+    """Decay of a row: imaginary part of its wave vector, over k0."""
     fade = light[2]
     if fading:
         return fade[row, 0], fade[row, 1], fade[row, 2]
@@ -150,7 +150,7 @@ def fading_of(light, row, fading):
 
 @part
 def copied(source, row, target, to, polarised, fading):
-    """Copy what a row carries through matter to a row of the same or another table."""
+    """Copy the state of a row in matter to a row of the same or another table."""
     medium, indices, fade, lengths, field, dropped, bend = source
     medium_to, indices_to, fade_to, lengths_to, field_to, dropped_to, bend_to = target
     medium_to[to], indices_to[to] = medium[row], indices[row]
@@ -166,7 +166,7 @@ def copied(source, row, target, to, polarised, fading):
 
 @jit
 def begin(light, count, index, ex, ey, ez):
-    """Fill the head of a table with rays in the scene's medium, of a field."""
+    """Initialise a table with rays in the scene's medium."""
     medium, indices, fade, lengths, field, dropped, bend = light
     medium[:count], indices[:count], dropped[:count], bend[:count] = 0, index, 0.0, 0.0
     fade[:count], lengths[:count] = 0.0, 0.0
@@ -177,7 +177,7 @@ def begin(light, count, index, ex, ey, ez):
 
 @jit
 def arrive(count, batch, light, met, triangle, limits, k0, ends, end_light, ended):
-    """Bring each ray to what it meets; write down those that end before.
+    """Move each ray to its hit; record those that end before.
 
     Rows that go on close up: they stand at the point, with the normal and the triangle there, and have
     the direction that they came in. Returns how many there are, and how many have ended.
@@ -226,7 +226,7 @@ def arrive(count, batch, light, met, triangle, limits, k0, ends, end_light, ende
 
 @part
 def duplicate(batch, light, row, to, number, polarised, fading):
-    """Copy a row that splits: the copy has lost nothing yet, and a serial number of its own."""
+    """Copy a row that splits; the copy has lost nothing yet, and a serial number of its own."""
     lost, amplitude, key, ray, bounces, reflections, serial, state, last, came = batch
     for k in range(state.shape[1]):
         state[to, k] = state[row, k]
@@ -245,7 +245,7 @@ def turn(state, row, d):
 
 @part
 def allowed(follow, returns, passes):
-    """Power of the branches that are followed, what is absorbed behind the surface, what is left aside."""
+    """Power of the branches that are followed, absorbed behind the surface, and truncated."""
     absorbed, dropped = 0.0, 0.0
     if follow & OPAQUE:
         absorbed, passes = passes, 0.0
@@ -258,7 +258,7 @@ def allowed(follow, returns, passes):
 
 @part
 def facing_of(state, row):
-    """Direction of a row, normal of what it stands at, and the cosine between them."""
+    """Direction of a row, normal at its hit, and the cosine between them."""
     dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
     nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
     return (dx, dy, dz), (nx, ny, nz), nx * dx + ny * dy + nz * dz
@@ -266,7 +266,7 @@ def facing_of(state, row):
 
 @part
 def sent(state, light, amplitude, row, d, medium, index, fade, field, brightness, faint, polarised, fading):
-    """Write how a branch goes on, and in what; whether it is bright enough to be followed."""
+    """Write the direction and medium of a branch; whether it is bright enough to follow."""
     turn(state, row, d)
     immerse(light, row, medium, index, fade, fading)
     carry(light, amplitude, row, field, polarised)
@@ -277,7 +277,7 @@ def sent(state, light, amplitude, row, d, medium, index, fade, field, brightness
 def meet(
     count, batch, light, owner, optics, film, k0, base, faint, first, why, parent, contradictions
 ):  # fmt: skip
-    """Send each ray of those that stand at surfaces on its way, or on two.
+    """Reflect, transmit or split each ray at its surface.
 
     The transmitted branch of a ray that splits follows behind all rows; `parent` is filled with the row
     that each of them comes from; they are numbered from `first` on. `why` is what becomes of each row;
@@ -341,7 +341,7 @@ def meet(
 
 @jit
 def leave(count, batch, light, why, ends, end_light, ended):
-    """Write down the rays that have ended at surfaces, close up the rest.
+    """Record the rays that ended at surfaces, and compact the rest.
 
     Returns how many go on, and how many have ended.
     """

@@ -1,4 +1,4 @@
-"""Compiled loops of the bounce passes: rays are launched, bounce, split, end, and are sorted.
+"""Compiled kernels of the tracing loop for mirrors: launch, reflect, split, end, sort.
 
 A `batch` is the columns of `rays.Batch`, `ends` those of `rays.Ends`, in their order.
 """
@@ -52,7 +52,7 @@ def launch(first, rows, columns, centre, u, v, direction, width, height, start, 
 
 @part
 def under_way(state, row):
-    """Where a ray of a batch starts, its direction, and its optical path up to there."""
+    """Start point, direction and optical path so far of a ray of a batch."""
     return (
         state[row, OX], state[row, OY], state[row, OZ], state[row, DX], state[row, DY], state[row, DZ],
         state[row, WAY],
@@ -61,7 +61,7 @@ def under_way(state, row):
 
 @part
 def ahead(met, row):
-    """The point that a ray meets next, the normal there, the path to it, and its distance from the edge."""
+    """Next hit of a ray: point, normal, path length, distance from the edge."""
     return (
         met[row, PX], met[row, PY], met[row, PZ], met[row, FX], met[row, FY], met[row, FZ], met[row, PATH],
         met[row, RIM],
@@ -70,7 +70,7 @@ def ahead(met, row):
 
 @part
 def depart(state, row, x, y, z, dx, dy, dz, nx, ny, nz, way, edge):
-    """Write a ray that leaves a face, into row `row` of a batch."""
+    """Write a ray that leaves a face into row `row` of a batch."""
     state[row, OX], state[row, OY], state[row, OZ] = x, y, z
     state[row, DX], state[row, DY], state[row, DZ] = dx, dy, dz
     state[row, NX], state[row, NY], state[row, NZ] = nx, ny, nz
@@ -79,7 +79,7 @@ def depart(state, row, x, y, z, dx, dy, dz, nx, ny, nz, way, edge):
 
 @part
 def conclude(origin, direction, length, fate, row, x, y, z, dx, dy, dz, way, why):
-    """Write the end of a path, into row `row` of the ends."""
+    """Write the end of a path into row `row` of the ends."""
     origin[row, 0], origin[row, 1], origin[row, 2] = x, y, z
     direction[row, 0], direction[row, 1], direction[row, 2] = dx, dy, dz
     length[row], fate[row] = way, why
@@ -87,33 +87,33 @@ def conclude(origin, direction, length, fate, row, x, y, z, dx, dy, dz, way, why
 
 @part
 def label(key, ray, bounces, row, here, number, steps):
-    """Write which path a row is: its key, the number of its ray, its bounces."""
+    """Write path key, ray number and bounces of a path."""
     key[row], ray[row], bounces[row] = here, number, steps
 
 
 @part
 def weigh(lost, amplitude, reflections, row, gone, left, mirrored):
-    """Write what a path has given off and kept."""
+    """Write lost power, amplitude and reflections of a path."""
     lost[row], amplitude[row], reflections[row] = gone, left, mirrored
 
 
 @part
 def latest(path, dx, dy, dz, bx, by, bz):
-    """From where a ray comes to a face: along its leg, or, if that has no length, as it came before."""
+    """Direction from which a ray reaches a face: along its segment, or as before if that has no length."""
     far = path > 0.0
     return (dx if far else bx), (dy if far else by), (dz if far else bz)
 
 
 @part
 def follows(came, last, serial, row, bx, by, bz, met, number):
-    """Write from where a row of a batch came, the triangle it has met, and its serial number."""
+    """Write previous direction, triangle and serial number of a row."""
     came[row, 0], came[row, 1], came[row, 2] = bx, by, bz
     last[row], serial[row] = met, number
 
 
 @jit
 def begin(start, along, length, first, batch):
-    """Fill a batch with rays that have met nothing yet; the amplitude is that of the path alone."""
+    """Initialise a batch with rays that have met nothing; the amplitude is relative to the launched one."""
     lost, amplitude, key, ray, bounces, reflections, serial, state, last, came = batch
     for i in range(len(start)):
         x, y, z, dx, dy, dz = start[i, 0], start[i, 1], start[i, 2], along[i, 0], along[i, 1], along[i, 2]
@@ -125,7 +125,7 @@ def begin(start, along, length, first, batch):
 
 @part
 def bounced(dx, dy, dz, nx, ny, nz, facing, steps):
-    """A direction after reflection at a face that it meets at the cosine `facing`.
+    """Reflected direction at a face with the cosine of incidence `facing`.
 
     Every eighth time, by the number of `steps`, a Newton step keeps the length at 1.
     """
@@ -139,7 +139,7 @@ def bounced(dx, dy, dz, nx, ny, nz, facing, steps):
 
 @part
 def fated(screen, has_screen, max_bounces, steps, meets, path, x, y, z, dx, dy, dz):
-    """What becomes of a ray before it meets a face `path` metres ahead (if any), and its path to the CCD."""
+    """Fate of a ray before it meets a face `path` metres ahead (if any), and its path to the CCD."""
     if has_screen:
         reach = lands(screen, path, x, y, z, dx, dy, dz)
         if reach < np.inf:
@@ -157,7 +157,7 @@ def square(value):
 
 @part
 def onward(before, r, t, faint):
-    """The branch of an amplitude that goes on from a surface: what is left, whether through it, its fate."""
+    """Branch that continues from a surface: amplitude, whether transmitted, fate."""
     through = not square(r) > 0.0
     left = before * t if through else before * r
     if through and not square(t) > 0.0:
@@ -169,7 +169,7 @@ def onward(before, r, t, faint):
 def rebound(
     count, steps, prim, batch, body, digit, base, limits, ends, first, origin32, direction32
 ):  # fmt: skip
-    """`measure`, `interact` and `aim` in one, for a single body of ideal mirrors that all rays just left.
+    """Fused `measure`, `interact` and `aim` for a single body of ideal mirrors that all rays just left.
 
     Each has made `steps` bounces. `digit` is what a triangle adds to a key of that `base`.
 
@@ -235,7 +235,7 @@ def rebound(
 
 @jit
 def close_up(batch, start, born, to, faint, ends, ended):
-    """Move the last `born` rows of a batch, from `start` on, up to row `to`; the faint ones end here.
+    """Move the last `born` rows of a batch, from `start` on, to row `to`; faint ones end here.
 
     Returns how many rows of the batch and of the ends are filled.
     """
@@ -265,7 +265,7 @@ def interact(
     count, batch, met, triangle, owner, reflection, transmission, plain, limits, faint, ends, ended, first,
     serials,
 ):  # fmt: skip
-    """Send each ray through what it met; write down those that end, close up the rest.
+    """Reflect, transmit or split each ray at its hit; record those that end, compact the rest.
 
     A ray that splits goes on as its reflected branch; transmitted ones follow behind all rows.
     Ends go to row `ray - first`, or, if `first` is negative, one after the other from `ended` on.
@@ -331,7 +331,7 @@ def interact(
 
 @jit
 def sort(ray, first, count):
-    """Order that sorts ends by their ray, those of one ray as they come (a counting sort)."""
+    """Stable counting sort of path ends by ray."""
     place = np.zeros(count + 1, np.int64)
     for i in range(len(ray)):
         place[ray[i] - first + 1] += 1

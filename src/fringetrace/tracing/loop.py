@@ -1,4 +1,4 @@
-"""The passes of a chunk of rays, until all its paths have ended: hit, interact, split, drop, again."""
+"""Tracing loop of a chunk of rays: hit, interact, split, drop, until all paths have ended."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.scene import CCD, Beam, Scene
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """All that a chunk needs to know, the same for every thread.
+    """Settings of a trace, shared by all threads.
 
     `plain`: all surfaces reflect with -1, so that amplitudes follow from the number of bounces.
     `splits`: some surface sends light both ways, so that a ray may have many ends. `matter` is None where
@@ -46,53 +47,97 @@ class Plan:
 
     @property
     def total(self) -> int:
-        """How many rays there are."""
+        """Number of rays."""
         source = self.source
         return source.shape[0] * source.shape[1] if isinstance(source, Beam) else len(source)
 
     def rays(self, first: int, stop: int) -> Rays:
-        """Some of the rays."""
+        """Range of the rays."""
         source = self.source
         return launch(source, first, stop) if isinstance(source, Beam) else source.part(first, stop)
 
 
-class Record:
-    """Triangles and points of the paths of a chunk, by serial number: one column for each pass.
+# What a record keeps of each hit, and what stands where there is none.
+Column = tuple[float, type, tuple[int, ...]]  # fill, dtype, shape of an entry
+HIT: dict[str, Column] = {
+    "triangle": (-1, np.int64, ()),
+    "point": (np.nan, np.float64, (3,)),
+    "branch": (-1, np.int8, ()),
+}
+IN_MEDIA: dict[str, Column] = {
+    "medium": (-1, np.int32, ()),
+    "index": (np.nan, np.float64, ()),
+}
+AT_ELEMENTS: dict[str, Column] = {
+    "departure": (np.nan, np.float64, (3,)),
+    "advance": (0.0, np.float64, ()),
+}
 
-    `left` is where light went on from those points; None where it did so from the points themselves.
+
+class Record:
+    """Hits of the paths of a chunk, by serial number: a table for each pass.
+
+    A path that parts from another inherits what that has met.
     """
 
-    def __init__(self, start: FloatArray) -> None:
-        self.points = [start.copy()]
-        self.left: list[FloatArray | None] = [None]
-        self.triangles: list[Array] = []
+    def __init__(self, start: FloatArray, plan: Plan) -> None:
+        self.start = start.copy()
+        self.key = np.zeros(len(start), dtype=np.uint64)
+        self.passes: list[dict[str, Array]] = []
+        matter = plan.matter
+        self.columns = (
+            HIT | (IN_MEDIA if matter else {}) | (AT_ELEMENTS if matter and matter.elements else {})
+        )
+        # branch that each digit of a key stands for
+        numbers = [number for number, _ in plan.scene.digits]
+        first = 2 * len(plan.scene.surfaces)
+        further = [2 + numbers[first:k].count(numbers[k]) for k in range(first, len(numbers))]
+        self.branches = np.array([0, *[0, 1] * len(plan.scene.surfaces), *further], dtype=np.int8)
 
     def born(self, parents: Array) -> None:
-        """Paths that part from others in the pass that was added last."""
-        self.points = [np.concatenate([column, column[parents]]) for column in self.points]
-        self.left = [c if c is None else np.concatenate([c, c[parents]]) for c in self.left]
-        self.triangles = [np.concatenate([column, column[parents]]) for column in self.triangles]
+        """Paths that part from others."""
 
-    def add(self, parents: Array, serials: Array, triangle: Array, point: FloatArray) -> None:
-        """Append a pass: paths born in it inherit, those named by `serials` met a triangle."""
-        self.born(parents)
-        total = len(self.points[0])
-        met, where = np.full(total, -1, dtype=np.int64), np.full((total, 3), np.nan)
-        met[serials], where[serials] = triangle, point
-        self.triangles.append(met)
-        self.points.append(where)
-        self.left.append(None)
+        def grown(column: Array) -> Array:
+            return np.concatenate([column, column[parents]])
 
-    def displaced(self, serials: Array, point: FloatArray) -> None:
-        """Paths that go on from elsewhere than where they were in the pass that was added last."""
-        column = self.points[-1].copy() if self.left[-1] is None else self.left[-1]
-        column[serials] = point
-        self.left[-1] = column
+        if len(parents):
+            self.start, self.key = grown(self.start), grown(self.key)
+            self.passes = [{name: grown(column) for name, column in one.items()} for one in self.passes]
+
+    def met(self, serials: Array, triangle: Array, point: FloatArray) -> None:
+        """Add a pass, in which some paths met a triangle."""
+        rows = len(self.key)
+        blank: dict[str, Array] = {
+            n: np.full((rows, *shape), fill, kind) for n, (fill, kind, shape) in self.columns.items()
+        }
+        self.passes.append(blank)
+        self.write(serials, triangle=triangle, point=point)
+
+    def went_on(self, serials: Array, key: npt.NDArray[np.uint64], **columns: Array) -> None:
+        """What some paths did in the pass that was added last: their keys now, and more."""
+        base = np.uint64(len(self.branches))
+        digit = key - base * self.key[serials]  # modulo 2^64, as keys are
+        self.key[serials] = key
+        self.write(serials, branch=self.branches[digit.astype(np.int64)], **columns)
+
+    def write(self, serials: Array, **columns: Array) -> None:
+        """Fill columns of the pass that was added last."""
+        for name, values in columns.items():
+            if name in self.columns:
+                self.passes[-1][name][serials] = values
+
+    def table(self, name: str, serials: Array, depth: int) -> Array:
+        """A column of the first passes for some paths, (m, depth, ...)."""
+        fill, kind, shape = self.columns[name]
+        table: Array = np.full((len(serials), depth, *shape), fill, kind)
+        for k, one in enumerate(self.passes[:depth]):
+            table[:, k] = one[name][serials]
+        return table
 
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """A chunk of rays whose paths have all ended, as many as `rows`."""
+    """Ended paths of a chunk of rays, as many as `rows`."""
 
     ends: Ends
     rows: int
@@ -106,7 +151,7 @@ class Chunk:
 
 @dataclass(eq=False)
 class Workspace:
-    """Arrays that a thread keeps from chunk to chunk."""
+    """Arrays that a thread reuses from chunk to chunk."""
 
     state: Batch
     hits: Hits
@@ -116,7 +161,7 @@ class Workspace:
 
     @staticmethod
     def blank(plan: Plan, rows: int) -> Workspace:
-        """Room for so many rays, and for some branches of each where they split."""
+        """Uninitialised arrays for so many rays, and for their branches where they split."""
         from fringetrace.tracing.intersect.embree import Hits
 
         room = rows * (4 if plan.splits else 1)
@@ -127,23 +172,31 @@ class Workspace:
         return space
 
 
-def _noted(record: Record, plan: Plan, before: dict[str, Array], ends: Ends, old: int, hits: Hits) -> None:
+def _noted(
+    record: Record, plan: Plan, before: dict[str, Array], space: Workspace, rows: int, ended: slice
+) -> None:
     """Write down a pass: every path that met something, on its way or at its end."""
+    hits, ends = space.hits, part(space.ends, ended.start, ended.stop)
     count = len(before["serial"])
     met = (hits.triangle[:count] >= 0) & (before["bounces"] < plan.max_bounces)
-    landed = ends.serial[old:][ends.fate[old:] == Fate.DETECTED]
-    met &= ~np.isin(before["serial"], landed)
+    met &= ~np.isin(before["serial"], ends.serial[ends.fate == Fate.DETECTED])
     splits = abs(plan.reflection) * abs(plan.transmission) > 0.0
     parents = np.flatnonzero(met)
     parents = parents[splits[plan.engine.owner[hits.triangle[parents]]]]
-    first = len(record.points[0])
+    first = len(record.key)
     serials = np.concatenate([before["serial"][met], np.arange(first, first + len(parents))])
-    rows = np.concatenate([np.flatnonzero(met), parents])
-    record.add(before["serial"][parents], serials, hits.triangle[rows], hits.met[rows, 1:4])
+    chosen = np.concatenate([np.flatnonzero(met), parents])
+    record.born(before["serial"][parents])
+    record.met(serials, hits.triangle[chosen], hits.met[chosen, 1:4])
+    stopped = np.isin(ends.fate, (Fate.ABSORBED, Fate.FAINT))
+    record.went_on(
+        np.concatenate([space.state.serial[:rows], ends.serial[stopped]]),
+        np.concatenate([space.state.key[:rows], ends.key[stopped]]),
+    )
 
 
 def nearest(plan: Plan, space: Workspace, count: int, passed: frozenset[int]) -> int:
-    """Nearest hits of the rays of a workspace, see `engine.find`; on the form where there is one.
+    """Find the nearest hits of the rays of a workspace, on exact forms where there are any.
 
     Parameters
     ----------
@@ -169,7 +222,7 @@ def nearest(plan: Plan, space: Workspace, count: int, passed: frozenset[int]) ->
 
 
 def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
-    """Follow rays to all their ends.
+    """Trace rays to all their ends.
 
     Parameters
     ----------
@@ -191,7 +244,7 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
     if len(space.state.ray) < len(rays):
         space.state, space.hits = blank(Batch, len(rays)), Hits.blank(len(rays))
     start(space.state, rays, first)
-    record = Record(rays.origin) if plan.record else None
+    record = Record(rays.origin, plan) if plan.record else None
     ordered = ends is not None
     ends = space.ends if ends is None else ends
     count, ended, serials, segments, doubtful, bounces = len(rays), 0, len(rays), 0, 0, 1
@@ -225,12 +278,12 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
         if simple:
             aim(plan.engine, state, count, hits, 0, True, cull=False)
         if record is not None:
-            _noted(record, plan, before, part(ends, 0, ended), old, hits)
+            _noted(record, plan, before, space, count, slice(old, ended))
     return Chunk(ends, ended, rays, segments, doubtful, record)
 
 
 def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
-    """The record of a chunk as the padded tables of `Paths`: surface, triangle, points, departures.
+    """The record of a chunk as the padded tables of `Paths`, from `surface` to `advances`.
 
     Parameters
     ----------
@@ -242,27 +295,30 @@ def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
     Returns
     -------
     dict of str to array
-        (m, b) int64, (m, b) int64, (m, b + 2, 3) float64 in metres; in scenes with thin elements
-        (m, b + 1, 3) float64 in metres, too.
+        See `Paths`.
     """
-    depth = int(ends.bounces.max(initial=0))
-    none = np.full(len(record.points[0]), -1, dtype=np.int64)
-    triangle = np.stack([*record.triangles, none], axis=1)[ends.serial, :depth]
+    depth, rows = int(ends.bounces.max(initial=0)), ends.serial
+    found = {name: record.table(name, rows, depth) for name in record.columns}
+    triangle = found.pop("triangle")
     surface = np.where(triangle >= 0, plan.engine.owner[triangle], -1).astype(np.int64)
-    points = np.full((len(triangle), depth + 2, 3), np.nan)
-    points[:, : depth + 1] = np.stack(record.points[: depth + 1], axis=1)[ends.serial]
+    points = np.full((len(rows), depth + 2, 3), np.nan)
+    points[:, 0], points[:, 1 : depth + 1] = record.start[rows], found.pop("point")
     landed = np.flatnonzero(ends.fate == Fate.DETECTED)
     points[landed, ends.bounces[landed] + 1] = ends.origin[landed]
     local = np.where(triangle >= 0, triangle - plan.engine.offset[surface], -1)
-    found = {"surface": surface, "triangle": local, "points": points}
-    if plan.matter is not None and plan.matter.elements:
-        left = [at if on is None else on for at, on in zip(record.points, record.left, strict=True)]
-        found["departures"] = np.stack(left[: depth + 1], axis=1)[ends.serial]
-    return found
+    kept = {"surface": surface, "triangle": local, "points": points, "branch": found.pop("branch")}
+    if plan.matter is not None:
+        media = np.zeros((len(rows), 1), dtype=np.int32), found.pop("medium")
+        index = np.full((len(rows), 1), plan.matter.media[0].real), found.pop("index")
+        kept |= {"media": np.concatenate(media, axis=1), "indices": np.concatenate(index, axis=1)}
+    if "departure" in found:
+        kept["departures"] = np.concatenate([points[:, :1], found["departure"]], axis=1)
+        kept["advances"] = found["advance"]
+    return kept
 
 
 def start(state: Batch, rays: Rays, first: int) -> None:
-    """Fill the head of a batch with rays at their start.
+    """Initialise a batch with rays at their start.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The passes of a chunk of rays through matter: arrive, meet boundaries and thin elements, leave."""
+"""Tracing loop of a chunk of rays through matter: arrive, meet boundaries and elements, leave."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class _State:
 
 
 def traverse(plan: Plan, space: Workspace, first: int, stop: int) -> Chunk:
-    """Follow rays through matter to all their ends.
+    """Trace rays through matter to all their ends.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def traverse(plan: Plan, space: Workspace, first: int, stop: int) -> Chunk:
     state = _begun(plan, space, len(rays))
     start(state.batch, rays, first)
     _fill(state.carried, rays, optics)
-    record = Record(rays.origin) if plan.record else None
+    record = Record(rays.origin, plan) if plan.record else None
     limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
     segments, doubtful, passed = 0, 0, plan.passed
     while state.count:
@@ -91,6 +91,8 @@ def traverse(plan: Plan, space: Workspace, first: int, stop: int) -> Chunk:
         _meet(plan, state, record)
         for number, element in optics.elements.items():
             _act(plan, state, number, element, record)
+        if record is not None:
+            _went_on(state, record)
         state.room(state.count)
         state.count, state.ended = leave(
             state.count, state.batch.columns, state.carried.columns, state.why, state.ends.columns,
@@ -141,7 +143,17 @@ def _meet(plan: Plan, state: _State, record: Record | None) -> None:
     state.count, state.serials = count + born, state.serials + born
     if record is not None:
         rows, now = state.parent[:born], slice(0, count + born)
-        record.add(batch.serial[rows], batch.serial[now], batch.last[now], batch.state[now, :3])
+        record.born(batch.serial[rows])
+        record.met(batch.serial[now], batch.last[now], batch.state[now, :3])
+
+
+def _went_on(state: _State, record: Record) -> None:
+    """Write down in what, and from where, the rays go on, those that end here too."""
+    batch, carried, now = state.batch, state.carried, slice(0, state.count)
+    record.went_on(
+        batch.serial[now], batch.key[now], medium=carried.medium[now], index=carried.index[now],
+        departure=batch.state[now, :3],
+    )  # fmt: skip
 
 
 def _field(carried: Carried, batch: Batch, rows: Array) -> ComplexArray:
@@ -155,7 +167,7 @@ def _power(field: ComplexArray) -> FloatArray:
 
 def _act(plan: Plan, state: _State, number: int, element: Element, record: Record | None) -> None:
     """Send the rays that stand at a thin element through it."""
-    from fringetrace.optics import Meeting
+    from fringetrace.optics import IncidentRays
 
     batch, optics = state.batch, plan.matter
     assert optics is not None
@@ -164,7 +176,7 @@ def _act(plan: Plan, state: _State, number: int, element: Element, record: Recor
     if len(rows) == 0:
         return
     table = batch.state[rows]
-    meeting = Meeting(
+    meeting = IncidentRays(
         point=table[:, :3], direction=table[:, 3:6], normal=table[:, 6:9], index=state.carried.index[rows],
         field=_field(state.carried, batch, rows), wavelength=optics.wavelength,
     )  # fmt: skip
@@ -220,9 +232,9 @@ def _write(
         batch.state[rows, 3:6] = branch.direction[which]
     if branch.point is not None:
         batch.state[rows, :3] = branch.point[which]
-        if record is not None:
-            record.displaced(batch.serial[rows], branch.point[which])
     if branch.path is not None:
         batch.state[rows, 9] += branch.path[which]
+        if record is not None:
+            record.write(batch.serial[rows], advance=branch.path[which])
     dark = np.where(power > 0.0, FAINT, ABSORBED)
     state.why[rows] = np.where((power > 0.0) & (power >= faint), ALIVE, dark)

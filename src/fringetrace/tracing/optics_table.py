@@ -1,4 +1,4 @@
-"""The media of a scene at a wavelength, as the kernels read them; paths at another wavelength."""
+"""Optical constants of a scene's media and surfaces at a wavelength, as tables for the kernels."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ INDICES = 1e-7, 1e7
 
 @dataclass(frozen=True, eq=False)
 class Optics:
-    """What the kernels of `refractions` need to know of a scene.
+    """Optical constants of a scene at a wavelength, for the kernels.
 
     Attributes
     ----------
@@ -59,24 +59,24 @@ class Optics:
 
     @property
     def columns(self) -> tuple[Array, ...]:
-        """The tables of surfaces and media."""
+        """Tables of surfaces and media."""
         return (
             self.kind, self.reflection, self.transmission, self.front, self.back, self.media, self.follow,
         )  # fmt: skip
 
     @property
     def fading(self) -> bool:
-        """Whether some medium absorbs."""
+        """Whether any medium absorbs."""
         return bool(self.media.imag.any())
 
     @property
     def branches(self) -> int:
-        """Branches that a ray may split into at one surface."""
+        """Maximum number of branches at one surface."""
         return max([2, *(element.branches for element in self.elements.values())])
 
 
-def materials(scene: Scene) -> tuple[Material, ...]:
-    """The media of a scene by their numbers, first that around it.
+def scene_media(scene: Scene) -> tuple[Material, ...]:
+    """Media of a scene by number, the surrounding one first.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def _film(surface: Surface) -> tuple[tuple[Material, float], ...]:
 
 
 def plain(scene: Scene, polarised: bool) -> bool:
-    """Whether light meets nothing but constant amplitudes in a vacuum.
+    """Whether all surfaces have constant amplitudes, and the medium is vacuum.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def plain(scene: Scene, polarised: bool) -> bool:
 
 
 def needs(scene: Scene) -> str | None:
-    """What in a scene depends on the wavelength, in words; None if nothing does.
+    """What makes a scene depend on the wavelength, in words; None if nothing does.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def needs(scene: Scene) -> str | None:
     -------
     str or None
     """
-    for medium in materials(scene):
+    for medium in scene_media(scene):
         if medium.dispersive:
             return f"{medium.name} is dispersive"
         if complex(medium.index(1.0)).imag != 0.0:
@@ -141,7 +141,7 @@ def needs(scene: Scene) -> str | None:
 
 
 def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | None:
-    """The media, boundaries and elements of a scene at a wavelength.
+    """Optical constants of media, boundaries and elements of a scene at a wavelength.
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         if element.polarised and not polarised:
             name = scene.surfaces[number].name
             raise ValueError(f"{name}: expected light with a polarisation, got a scalar beam")
-    known = materials(scene)
+    known = scene_media(scene)
     at = 1.0 if wavelength is None else wavelength
     numbers = {medium: number for number, medium in enumerate(known)}
     sides = [[s.front or scene.around, s.back or scene.around] for s in scene.surfaces]
@@ -186,7 +186,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         front=table[:, 0].copy(),
         back=table[:, 1].copy(),
         media=np.array([_index(medium, at) for medium in known]),
-        follow=np.array([_followed(surface) for surface in scene.surfaces], dtype=np.int8),
+        follow=np.array([followed_branches(surface) for surface in scene.surfaces], dtype=np.int8),
         film=_layers(scene, at),
         k0=0.0 if wavelength is None else 2.0 * math.pi / wavelength,
         wavelength=wavelength,
@@ -204,7 +204,7 @@ def _index(medium: Material, wavelength: float) -> complex:
 
 
 def thin(scene: Scene) -> dict[int, Element]:
-    """The thin elements of a scene, by the number of their surface.
+    """Thin elements of a scene, by surface number.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def thin(scene: Scene) -> dict[int, Element]:
 
 
 def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
-    """Amplitudes of both branches of each surface where they are constant.
+    """Reflection and transmission amplitudes of surfaces where they are constant.
 
     Parameters
     ----------
@@ -240,7 +240,8 @@ def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
     return table[0], table[1]
 
 
-def _followed(surface: Surface) -> int:
+def followed_branches(surface: Surface) -> int:
+    """Bits of the branches that are traced at a surface: reflected, transmitted, or opaque."""
     if isinstance(surface.interface, Metal):
         return REFLECTED | OPAQUE
     if isinstance(surface.interface, Dielectric):

@@ -1,86 +1,110 @@
-"""What recorded paths met: how far each hit is from where it belongs, and what that does to the path."""
+"""Segments and hits of recorded paths: lengths, directions, media, optical path and phase along the way."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, unit
-from fringetrace.geometry import Fit, LevelFit, Patches, dot
+from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.geometry import Fit, LevelFit, Patches
 from fringetrace.scene import Surface
-from fringetrace.tracing.optics_table import materials
+from fringetrace.tracing.optics_table import constants
 from fringetrace.tracing.paths import Paths
 
 # What tells roundings of float64 has more digits, where the machine has such numbers.
 EXTENDED = np.longdouble
 
 
+def _recorded(paths: Paths, what: str) -> None:
+    if paths.surface is None or paths.triangle is None or paths.points is None or paths.branch is None:
+        raise ValueError(f"{what}: expected paths traced with record=True, got paths without points")
+
+
 @dataclass(frozen=True, eq=False)
-class Met:
-    """Bounces of some paths on one surface: the path and bounce of each, its point (n, 3) and face (n,)."""
+class Segments:
+    """Segments of recorded paths: one before each hit, and one behind the last, to the CCD.
 
-    surface: Surface
-    fit: Fit | None
-    path: npt.NDArray[np.int64]
-    bounce: npt.NDArray[np.int64]
-    point: FloatArray
-    face: npt.NDArray[np.int64]
-
-    @property
-    def formed(self) -> npt.NDArray[np.bool_]:
-        """(n,) bool: on faces that have a form."""
-        if self.fit is None:
-            return np.zeros(len(self.face), dtype=np.bool_)
-        return np.asarray(self.fit.along[self.face] != 0)
-
-
-def met(paths: Paths) -> Iterator[Met]:
-    """Bounces of recorded paths, surface by surface.
-
-    Parameters
+    Attributes
     ----------
-    paths : Paths
-        Traced with record=True.
-
-    Yields
-    ------
-    Met
-
-    Raises
-    ------
-    ValueError
-        If the trace did not record them.
-    """
-    if paths.surface is None or paths.triangle is None or paths.points is None:
-        raise ValueError("contacts: expected paths traced with record=True, got paths without points")
-    for number, surface in enumerate(paths.scene.surfaces):
-        path, bounce = np.nonzero(paths.surface == number)
-        if len(path) == 0:
-            continue
-        fit = None if surface.form is None else surface.form.fit(surface.mesh.vertices, surface.mesh.faces)
-        point = paths.points[path, bounce + 1]
-        yield Met(surface, fit, path, bounce, point, paths.triangle[path, bounce])
-
-
-def legs(paths: Paths) -> tuple[Array, Array]:
-    """Segments of recorded paths, from the recorded points alone.
-
-    Parameters
-    ----------
-    paths : Paths
-        Traced with record=True.
-
-    Returns
-    -------
     length : (m, b + 1) longdouble, metres
-        Of the segment before each bounce, and of the one to the CCD, negative where the plane that
-        it sees lies behind the last surface; 0 where there is none.
+        From where a segment starts to the next point; 0 where there is none. To the CCD's plane of focus it
+        is negative where that lies behind the last surface.
     direction : (m, b + 1, 3) longdouble, unit
-        Of the light on each segment.
+        Of the light; 0 where there is no segment, and on those of length 0 between two hits.
+    medium : (m, b + 1) int32
+        Number in `fringetrace.tracing.scene_media`; 0 where there is no segment.
+    index : (m, b + 1) float64
+        Real refractive index for the ray, |Re k| / k0; 1 where there is no segment.
+    through : (m, b) bool
+        Whether light went on to the other side of the surface at each hit.
+    advance : (m, b) float64, metres
+        Optical path that a thin element added at each hit.
     """
+
+    length: Array
+    direction: Array
+    medium: npt.NDArray[np.int32]
+    index: FloatArray
+    through: npt.NDArray[np.bool_]
+    advance: FloatArray
+
+    @staticmethod
+    def of(paths: Paths) -> Segments:
+        """The segments of some paths.
+
+        Parameters
+        ----------
+        paths : Paths
+            Traced with record=True.
+
+        Returns
+        -------
+        Segments
+
+        Raises
+        ------
+        ValueError
+            If the trace did not record them.
+        """
+        _recorded(paths, "segments")
+        assert paths.branch is not None
+        length, direction = _lengths(paths)
+        shape = length.shape
+        medium, index = paths.media, paths.indices
+        return Segments(
+            length=length,
+            direction=direction,
+            medium=np.zeros(shape, dtype=np.int32) if medium is None else np.maximum(medium, 0),
+            index=np.ones(shape) if index is None else np.where(np.isnan(index), 1.0, index),
+            through=_through(paths, direction),
+            advance=np.zeros(paths.branch.shape) if paths.advances is None else paths.advances,
+        )
+
+    def optical_path(self, start: FloatArray | float = 0.0) -> FloatArray:
+        """Optical path from the start to each point.
+
+        Parameters
+        ----------
+        start : (m,) float64, metres
+            That the rays bring along.
+
+        Returns
+        -------
+        (m, b + 2) float64, metres
+            To a hit without what an element there adds; unchanged behind the last point.
+        """
+        steps = np.asarray(self.length, dtype=np.float64) * self.index
+        steps[:, 1:] += self.advance
+        first = np.broadcast_to(start, (len(steps),))
+        return np.asarray(np.cumsum(np.column_stack([first, steps]), axis=1), dtype=np.float64)
+
+
+def _lengths(paths: Paths) -> tuple[Array, Array]:
+    """Lengths and directions of segments, from the recorded points."""
     assert paths.points is not None
     assert paths.starts is not None
     step = paths.points[:, 1:].astype(EXTENDED) - paths.starts
@@ -95,100 +119,159 @@ def legs(paths: Paths) -> tuple[Array, Array]:
     return np.where(np.isfinite(length), length, 0.0), np.nan_to_num(direction)
 
 
-def indices(paths: Paths) -> FloatArray:
-    """Real refractive index on each segment of recorded paths.
+def _through(paths: Paths, direction: Array) -> npt.NDArray[np.bool_]:
+    """Whether light went on to the other side at each hit; branches of elements may go back."""
+    assert paths.branch is not None
+    through = paths.branch > 0
+    for hits in surface_hits(paths):
+        if hits.surface.element is not None:
+            normal, (path, hit) = hits.facet_normal, (hits.path, hits.hit)
+            into, out = (dot(normal, direction[path, hit + k].astype(np.float64)) for k in (0, 1))
+            through[path, hit] = into * out > 0.0
+    return np.asarray(through)
+
+
+def surface_phase(paths: Paths, through: Array) -> FloatArray:
+    """By how much surfaces turned the phase up to each point.
+
+    Parameters
+    ----------
+    paths : Paths
+        Traced with record=True.
+    through : (m, b) bool
+        See `Segments`.
+
+    Returns
+    -------
+    (m, b + 2) float64, radians
+        0 for polarised light. What boundaries, films and thin elements do to the phase is known in all:
+        it stands behind the last of them that was hit.
+    """
+    assert paths.surface is not None
+    assert paths.points is not None
+    phase: FloatArray = np.zeros(paths.points.shape[:2])
+    if paths.field is not None:
+        return phase
+    reflection, transmission = constants(paths.scene)
+    factor = np.where(through, transmission[paths.surface], reflection[paths.surface])
+    turn = np.where((paths.surface >= 0) & (factor != 0.0), np.angle(factor), 0.0)
+    launched = getattr(paths.source, "amplitude", None)
+    if launched is not None:
+        phase += np.angle(launched[paths.ray])[:, None]
+    phase[:, 1:-1] += np.cumsum(turn, axis=1)
+    phase[:, -1] = phase[:, -2]
+    rest = np.angle(paths.amplitude * np.exp(-1j * phase[:, -1]))  # 0 of no light
+    known = np.array([s.boundary or s.element is not None for s in paths.scene.surfaces])
+    hit = (paths.surface >= 0) & known[paths.surface]
+    last = np.where(hit, np.arange(1, hit.shape[1] + 1), 0).max(axis=1, initial=0)
+    late = np.arange(phase.shape[1]) >= last[:, None]
+    return np.asarray(phase + np.where(late, rest[:, None], 0.0), dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceHits:
+    """Hits of recorded paths on one surface.
+
+    Attributes
+    ----------
+    surface : Surface
+    fit : Fit or None
+        Of its form to its mesh.
+    path, hit : (n,) int64
+        Which path, and which of its hits.
+    point : (n, 3) float64, metres
+    face : (n,) int64
+        Number of the facet.
+    """
+
+    surface: Surface
+    fit: Fit | None
+    path: npt.NDArray[np.int64]
+    hit: npt.NDArray[np.int64]
+    point: FloatArray
+    face: npt.NDArray[np.int64]
+
+    @property
+    def formed(self) -> npt.NDArray[np.bool_]:
+        """(n,) bool: on facets that have a form."""
+        if self.fit is None:
+            return np.zeros(len(self.face), dtype=np.bool_)
+        return np.asarray(self.fit.along[self.face] != 0)
+
+    @cached_property
+    def corners(self) -> FloatArray:
+        """(n, 3, 3) float64, metres: corners of the facets, first those of the shortest side.
+
+        Good for normals of needles.
+        """
+        corners = self.surface.mesh.vertices[self.surface.mesh.faces[self.face]]
+        sides = ((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2)
+        order = (np.argmin(sides, axis=1)[:, None] + np.arange(3)) % 3
+        return np.take_along_axis(corners, order[:, :, None], axis=1)
+
+    @cached_property
+    def facet_normal(self) -> FloatArray:
+        """(n, 3) float64, unit: normals of the facets, towards the front."""
+        corner = self.corners
+        return unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
+
+    @cached_property
+    def normal(self) -> FloatArray:
+        """(n, 3) float64, unit: normals of the surface, of either sense; those of the form if it has one."""
+        normal, on = self.facet_normal.copy(), self.formed
+        if on.any():
+            normal[on] = unit(self.level(on, normal[on])[1])
+        return normal
+
+    def level(self, rows: Array, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Level function of the form at some hits, and its derivatives.
+
+        Parameters
+        ----------
+        rows : (n,) bool
+            Which hits, k of them; all have a form.
+        direction : (k, 3) float64, unit
+
+        Returns
+        -------
+        value : (k,) float64, metres
+        gradient : (k, 3) float64
+        second : (k,) float64, 1/m
+            Second derivative along `direction`.
+        """
+        point = self.point[rows]
+        if isinstance(self.fit, LevelFit):
+            return self.fit.form.level(point, direction)
+        assert isinstance(self.fit, Patches)
+        return self.fit.level(point, direction, self.face[rows])[:3]
+
+
+def surface_hits(paths: Paths) -> Iterator[SurfaceHits]:
+    """Hits of recorded paths, surface by surface.
 
     Parameters
     ----------
     paths : Paths
         Traced with record=True.
 
-    Returns
-    -------
-    (m, b + 1) float64
-        Before each bounce, and behind the last; that of the wave, |Re k| / k0, where it fades aslant.
+    Yields
+    ------
+    SurfaceHits
+
+    Raises
+    ------
+    ValueError
+        If the trace did not record them.
     """
+    _recorded(paths, "surface_hits")
+    assert paths.surface is not None
+    assert paths.triangle is not None
     assert paths.points is not None
-    shape = len(paths), paths.points.shape[1] - 1
-    if paths.medium is None:
-        return np.ones(shape)
-    known = {m: complex(m.index(paths.wavelength or 1.0)) for m in materials(paths.scene)}
-    direction = np.asarray(legs(paths)[1], dtype=np.float64)
-    medium, normal = np.full(shape, np.nan, dtype=np.complex128), np.zeros((*shape, 3))
-    medium[:, 0] = known[paths.scene.around]
-    for bounces in met(paths):
-        surface, at = bounces.surface, (bounces.path, bounces.bounce + 1)
-        normal[at] = normals(bounces)
-        if not surface.boundary:
-            continue
-        front = np.einsum("ni,ni->n", facing(bounces), direction[at]) > 0.0
-        before, behind = (known[side or paths.scene.around] for side in (surface.front, surface.back))
-        medium[at] = np.where(front, before, behind)
-    # as it was, where no boundary changed it
-    latest = np.maximum.accumulate(np.where(np.isnan(medium), 0, np.arange(shape[1])), axis=1)
-    medium = np.take_along_axis(medium, latest, axis=1)
-    return _slanting(medium, normal, direction) if medium.imag.any() else medium.real
-
-
-def _slanting(medium: ComplexArray, normal: FloatArray, direction: FloatArray) -> FloatArray:
-    """|Re k| / k0 on each segment, in media that may absorb; see `refractions`.
-
-    `medium` (m, b + 1) are their indices, `normal` (m, b + 1, 3) those of the surfaces met before.
-    """
-    index = medium.real.copy()
-    fade = medium[:, 0].imag[:, None] * direction[:, 0]
-    for k in range(1, index.shape[1]):
-        n, first, last = normal[:, k], medium[:, k - 1], medium[:, k]
-        into, out = dot(n, direction[:, k - 1]), dot(n, direction[:, k])
-        sense, along = np.sign(into), dot(n, fade)
-        before = index[:, k - 1] * np.abs(into) + 1j * sense * along
-        behind = np.sqrt((last - first) * (last + first) + before**2)
-        behind = np.where(behind.real + behind.imag < 0.0, -behind, behind)
-        back = into * out < 0.0
-        deeper = sense * (behind - before) * (first != last)
-        wave = index[:, k - 1, None] * direction[:, k - 1] + deeper.real[:, None] * n
-        index[:, k] = np.where(back, index[:, k - 1], np.sqrt(dot(wave, wave)))
-        fade = fade + np.where(back, -2.0 * along, deeper.imag)[:, None] * n
-    return index
-
-
-def facing(bounces: Met) -> FloatArray:
-    """Normal (n, 3) of the facet at each bounce, towards the front."""
-    corner = corners(bounces)
-    return unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
-
-
-def corners(bounces: Met) -> FloatArray:
-    """Corners (n, 3, 3) of the facets met, first those of the shortest side: good for normals of needles."""
-    corners = bounces.surface.mesh.vertices[bounces.surface.mesh.faces[bounces.face]]
-    sides = ((np.roll(corners, -1, axis=1) - corners) ** 2).sum(axis=2)
-    order = (np.argmin(sides, axis=1)[:, None] + np.arange(3)) % 3
-    return np.take_along_axis(corners, order[:, :, None], axis=1)
-
-
-def normals(bounces: Met) -> FloatArray:
-    """Normal of the surface at each bounce, of either sense.
-
-    Parameters
-    ----------
-    bounces : Met
-
-    Returns
-    -------
-    (n, 3) float64, unit
-    """
-    normal = facing(bounces)
-    on = bounces.formed
-    if on.any():
-        gradient = level(bounces, on, normal[on])[1]
-        normal[on] = unit(gradient)
-    return normal
-
-
-def level(bounces: Met, on: Array, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Level function of the form at some bounces, its gradient, its second derivative along directions."""
-    fit, point = bounces.fit, bounces.point[on]
-    if isinstance(fit, LevelFit):
-        return fit.form.level(point, direction)
-    assert isinstance(fit, Patches)
-    return fit.level(point, direction, bounces.face[on])[:3]
+    for number, surface in enumerate(paths.scene.surfaces):
+        path, hit = np.nonzero(paths.surface == number)
+        if len(path):
+            fit = (
+                None if surface.form is None else surface.form.fit(surface.mesh.vertices, surface.mesh.faces)
+            )
+            point = paths.points[path, hit + 1]
+            yield SurfaceHits(surface, fit, path, hit, point, paths.triangle[path, hit])

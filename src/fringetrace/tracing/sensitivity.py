@@ -1,58 +1,58 @@
-"""Derivatives of the optical path with respect to hit points."""
+"""Derivatives of the optical path and of ray directions with respect to where surfaces stand."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray
-from fringetrace.tracing.paths import Paths
-from fringetrace.tracing.segments import EXTENDED, Met, facing, indices
+from fringetrace.core import Array, FloatArray, dot
+from fringetrace.tracing.segments import EXTENDED, Segments, SurfaceHits
 
 
-def shifted(paths: Paths, bounces: Met, offset: Array, turn: Array) -> Array:
-    """What it does to the path that a surface stands somewhere else: -(n' d_out - n d_in) . offset.
+def path_change(segments: Segments, hits: SurfaceHits, offset: Array) -> Array:
+    """Change of optical paths where a surface stands somewhere else: -(n' d_out - n d_in) . offset.
+
+    By Fermat's principle, errors of directions and of places along the surfaces do not count, to first order.
 
     Parameters
     ----------
-    paths : Paths
-        Traced with record=True.
-    bounces : Met
+    segments : Segments
+        Of m paths.
+    hits : SurfaceHits
+        n hits of the same paths.
     offset : (n, 3), metres
         Of the hits from where they belong.
-    turn : (m, b + 1, 3)
-        Directions of the segments, see `legs`.
 
     Returns
     -------
     (m,) longdouble, metres
-        Summed over the bounces of each path. By Fermat's principle, what directions and places
-        along the surfaces err does not count, to first order.
+        Summed over the hits of each path.
     """
-    index = indices(paths)
-    after, before = (bounces.path, bounces.bounce + 1), (bounces.path, bounces.bounce)
-    turned = index[after][:, None] * turn[after] - index[before][:, None] * turn[before]
-    error = np.zeros(len(paths), dtype=EXTENDED)
-    np.add.at(error, bounces.path, -(turned * offset).sum(axis=1))
-    return error
+    after, before = (hits.path, hits.hit + 1), (hits.path, hits.hit)
+    index, direction = segments.index, segments.direction
+    turned = index[after][:, None] * direction[after] - index[before][:, None] * direction[before]
+    change = np.zeros(len(index), dtype=EXTENDED)
+    np.add.at(change, hits.path, -(turned * offset).sum(axis=1))
+    return change
 
 
-def leverage(bounces: Met, direction: FloatArray, index: FloatArray) -> FloatArray:
-    """How far rays turn at each bounce where the surface turns by 1: 2 off a mirror.
+def leverage(segments: Segments, hits: SurfaceHits) -> FloatArray:
+    """How far rays turn at each hit where the surface turns by 1: 2 off a mirror.
 
     From Snell's law, n' d' = n d + (n' c' - n c) nu, with cosines c to the normal nu.
 
     Parameters
     ----------
-    bounces : Met
-    direction : (m, b + 1, 3) float64
-    index : (m, b + 1) float64
+    segments : Segments
+    hits : SurfaceHits
+        n hits of the same paths.
 
     Returns
     -------
     (n,) float64
     """
-    normal = facing(bounces)
-    after, before = (bounces.path, bounces.bounce + 1), (bounces.path, bounces.bounce)
-    out = index[after] * np.einsum("ni,ni->n", direction[after], normal)
-    into = index[before] * np.einsum("ni,ni->n", direction[before], normal)
+    normal = hits.facet_normal
+    after, before = (hits.path, hits.hit + 1), (hits.path, hits.hit)
+    out, into = (
+        segments.index[at] * dot(normal, segments.direction[at].astype(np.float64)) for at in (after, before)
+    )
     return np.asarray(np.abs((out - into) / out), dtype=np.float64)

@@ -1,4 +1,4 @@
-"""A beam or rays through a scene: chunk by chunk, on a thread pool."""
+"""Ray tracer: a beam or rays through a scene, chunk by chunk on a thread pool."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fringetrace.core import Array, ComplexArray
+from fringetrace.core import Array, ComplexArray, checked_whole
 from fringetrace.scene import CCD, Beam, Scene, screen
 from fringetrace.tracing.batch import Carried, Ends, blank, part
 from fringetrace.tracing.loop import Plan, Record, Workspace, advance, tables
@@ -29,12 +29,8 @@ Progress = Callable[[int, int], None]
 Result = TypeVar("Result")
 # Fewer rays: what a pass costs in Python shows (30 us each). More: memory, 10 MB a thread here.
 CHUNK = 32768
-
-
-def _whole(value: int, least: int, what: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise ValueError(f"{what}: expected a whole number of at least {least}, got {value!r}")
-    return int(value)
+# Bounces are counted in 32 bits; no trace lives to see so many.
+MOST = 2**31 - 2
 
 
 def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
@@ -55,7 +51,7 @@ def _plan(
         raise TypeError(f"trace: expected a Beam or Rays, got {type(source).__name__}")
     if ccd is not None and not isinstance(ccd, CCD):
         raise TypeError(f"trace: expected a CCD or None, got {type(ccd).__name__}")
-    most = _whole(max_bounces, 0, "max_bounces")
+    most = min(checked_whole(max_bounces, 0, "max_bounces"), MOST)
     if not (isinstance(min_amplitude, Real) and np.isfinite(min_amplitude) and min_amplitude >= 0.0):
         raise ValueError(f"min_amplitude: expected a number of at least 0, got {min_amplitude!r}")
     from fringetrace.tracing.intersect.embree import build
@@ -161,7 +157,7 @@ def _chunk(plan: Plan, chunk: int | None) -> int:
     """Rays to be followed at a time: fewer where each may become several."""
     if chunk is None:
         return CHUNK // 4 if plan.splits else CHUNK
-    return _whole(chunk, 1, "chunk")
+    return checked_whole(chunk, 1, "chunk")
 
 
 def _pooled(
@@ -267,7 +263,7 @@ def stream(
     chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Paths]:
-    """Trace in chunks that need not fit into memory together; arguments as for `trace`.
+    """Trace in chunks, which need not fit into memory together; arguments as for `trace`.
 
     Parameters
     ----------
@@ -280,7 +276,7 @@ def stream(
         Of consecutive rays, in their order.
     """
     plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
-    workers = None if threads is None else _whole(threads, 1, "threads")
+    workers = None if threads is None else checked_whole(threads, 1, "threads")
     return _in_chunks(plan, workers, _chunk(plan, chunk), progress)
 
 
@@ -297,7 +293,7 @@ def trace(
     chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Paths:
-    """Follow rays through a scene until they are detected, leave, or are cut off.
+    """Trace rays through a scene until they are detected, leave, or are cut off.
 
     Parameters
     ----------
@@ -335,7 +331,7 @@ def trace(
         wavelength that is missing, or outside the range of a material.
     """
     plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
-    workers = None if threads is None else _whole(threads, 1, "threads")
+    workers = None if threads is None else checked_whole(threads, 1, "threads")
     size = _chunk(plan, chunk)
     if not (plan.splits or record):
         return _at_once(plan, workers, size, progress)

@@ -10,8 +10,9 @@ from hypothesis import Phase, given, settings, strategies as st
 import fringetrace as ft
 from fringetrace import instruments, mm, nm
 from fringetrace.core.vectors import rotation
-from fringetrace.field.wavefront import boundary_search, plane_waves, probe, visibility
+from fringetrace.field.wavefront import boundary_search, plane_waves, visibility
 from fringetrace.geometry import shapes
+from fringetrace.scene import facet_groups
 from fringetrace.tracing.rays import launch, launch_at
 
 HENE = 632.8 * nm
@@ -33,7 +34,7 @@ def flux(paths):
 
 def test_triangles_of_one_plane_have_one_number():
     mesh = shapes.staircase(3 * mm, 2 * mm, 3, 70 * nm).moved((1e-3, 0, 2e-3), rotation((1, 2, 3), 0.7))
-    (planes,) = probe.parted(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
+    (planes,) = facet_groups.group_facets(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
     assert (planes[::2] == planes[1::2]).all()
     assert len(np.unique(planes)) == 5
 
@@ -81,8 +82,8 @@ def test_a_mirror_off_the_camera_brings_nothing():
 
 def test_a_corner_inside_a_cell_is_found_by_quartering():
     mesh = shapes.plate(1.07 * mm, 1.07 * mm).moved((0.4 * mm, 0.4 * mm, 0))
-    ((wave, region),) = plane_waves.waves(visibility.survey(lit(mesh, (5, 5))))
-    assert abs(wave.amplitude) == pytest.approx(1.0, rel=ROUNDING)
+    ((wave, region),) = plane_waves.plane_waves_of(visibility.survey(lit(mesh, (5, 5))))
+    assert abs(wave.amplitude) == pytest.approx([1.0], rel=ROUNDING)
     assert (region.pieces[:, 2] - region.pieces[:, 0]).min() == 0.5**boundary_search.DEPTH
     # each quartering of the four corners leaves a few pieces, not all of the edge
     assert len(region.pieces) < 4 * 4 * (boundary_search.DEPTH + 2)
@@ -90,7 +91,7 @@ def test_a_corner_inside_a_cell_is_found_by_quartering():
 
 def test_a_straight_edge_costs_one_piece_a_cell():
     step = shapes.step(9 * mm, 9 * mm, 0.1 * mm, 80 * nm).moved(turn=rotation((0, 0, 1), 0.4))
-    found = list(plane_waves.waves(visibility.survey(lit(step))))
+    found = list(plane_waves.plane_waves_of(visibility.survey(lit(step))))
     assert len(found) == 2
     for _, region in found:
         assert (region.pieces[:, 2:4] - region.pieces[:, :2] == 1.0).all()
@@ -101,7 +102,7 @@ def test_parts_of_the_paths_bring_their_part_of_the_light():
         shapes.step(9 * mm, 9 * mm, 0.4 * mm, 80 * nm), aperture=3 * mm, pixels=(8, 9)
     )
     paths = bench.trace().detected
-    visits = paths.visits(bench.reference)
+    visits = paths.visits(bench.arms.reference.surface)
     parts = [ft.complex_field(paths.where(visits == n), HENE, "wavefront") for n in (0, 1)]
     assert abs(parts[1]) == pytest.approx(np.full((8, 9), 0.5), abs=1e-9)
     whole = ft.complex_field(paths, HENE, "wavefront")

@@ -1,4 +1,4 @@
-"""Sheets off flat facets: a plane wave for each sequence of facets, and its region of the beam."""
+"""Plane waves off sequences of flat facets, and their regions of the beam."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray, FloatArray, frame, unit
-from fringetrace.field.pixel_quadrature import Samples
+from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront.boundary_search import cut
 from fringetrace.field.wavefront.probe import RIM, profile
 from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
-from fringetrace.optics import refracted
+from fringetrace.optics import refract
 from fringetrace.scene import CCD, Beam, Surface
-from fringetrace.tracing import Paths, indices, landed
+from fringetrace.tracing import Paths, Segments, components, landed
 
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """A plane wave off a sequence of facets.
+    """Plane wave off a sequence of facets.
 
     Attributes
     ----------
@@ -35,7 +35,8 @@ class Wave:
     path : float, metres
         Its optical path.
     gradient : (2,) float64, metres a pixel
-    amplitude : complex
+    amplitude : (components,) complex128
+        See `components`.
     """
 
     name: np.uint64
@@ -44,16 +45,16 @@ class Wave:
     start: FloatArray
     path: float
     gradient: FloatArray
-    amplitude: complex
+    amplitude: ComplexArray
 
     def to_pixels(self, at: FloatArray) -> FloatArray:
-        """Points (..., 2) of the beam's grid on the CCD."""
+        """CCD coordinates of points (..., 2) of the beam's grid."""
         return np.asarray(self.origin + (at - self.start) @ self.matrix.T, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where on the beam's grid a wave starts: cells from `low` on, and pieces of cells, see `raster`.
+    """Region of the beam's grid where a wave starts: cells from `low` on, and pieces of cells.
 
     `segments` are the region's edges on the beam's grid, (n, 2, 2).
     """
@@ -82,25 +83,22 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
     assert paths.starts is not None
+    assert paths.branch is not None
     u, v, direction = frame(beam.direction, beam.up, "Beam")
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
     count = paths.bounces[row]
     legs = paths.points[row, 2 : count + 1] - paths.starts[row, 1:count]
     onward = np.concatenate([legs, paths.direction[row, None]])
-    index = indices(paths.where(np.array([row])))[0]
+    index = Segments.of(paths.where(np.array([row]))).index[0]
     for k, (surface, normal) in enumerate(_met(paths, row)):
-        leaving = onward[k] / np.linalg.norm(onward[k])
-        turned = direction - 2.0 * (direction @ normal) * normal
-        bent = refracted(direction, normal, index[k], index[k + 1])
-        if hasattr(surface.interface, "act"):
-            bent = leaving
-        # at an edge a leg may be a rounding long, and tell nothing: but mirrors let nothing through
-        mirror = getattr(surface.interface, "transmission", None) == 0.0
-        # NaN where light is totally reflected
-        if mirror or not np.linalg.norm(leaving - bent) <= np.linalg.norm(leaving - turned):
+        if paths.branch[row, k] == 0:
             across = across - 2.0 * np.outer(normal, normal @ across)
-            direction = turned
-        elif bent is not direction:
+            direction = direction - 2.0 * (direction @ normal) * normal
+            continue
+        bent = refract(direction, normal, index[k], index[k + 1])
+        if surface.element is not None:
+            bent = onward[k] / np.linalg.norm(onward[k])
+        if bent is not direction:
             # the step along the surface is the same on both sides
             across = across - np.outer(direction, (normal @ across) / (normal @ direction))
             direction = bent
@@ -118,8 +116,8 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
         matrix=matrix,
         start=start,
         path=float(length[0]),
-        gradient=index[-1] * np.array([direction @ right, direction @ up]) * ccd.pitch,
-        amplitude=complex(paths.amplitude[row]) * size,
+        gradient=index[count] * np.array([direction @ right, direction @ up]) * ccd.pitch,
+        amplitude=components(paths.where(np.array([row])), ccd)[:, 0] * size,
     )
 
 
@@ -132,8 +130,8 @@ def _near(wave: Wave, row: Array, column: Array, ccd: CCD) -> npt.NDArray[np.boo
     return np.asarray(across & (y.max(axis=1) > 0) & (y.min(axis=1) < rows))
 
 
-def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
-    """Plane waves on a CCD off the facets of a scene, and the regions of the beam they come from.
+def plane_waves_of(survey: Survey) -> Iterator[tuple[Wave, Region]]:
+    """Plane waves on a CCD off the facets of a scene, and their regions of the beam.
 
     Parameters
     ----------
@@ -153,7 +151,7 @@ def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
         row = int(survey.first[index])
         start = np.clip(survey.at[survey.paths.ray[row]], RIM, np.array(beam.shape[::-1]) - RIM)
         wave = _wave(survey.paths, row, survey.names[index], start, beam, ccd)
-        if wave.amplitude != 0:
+        if wave.amplitude.any():
             squares.append(_squares(survey, index, wave, len(found)))
             found.append(wave)
             which.append(index)
@@ -204,11 +202,12 @@ def _region(pieces: Pieces, beam: Beam) -> Region:
 
 
 def _light(beam: Beam, wave: Wave, points: Samples) -> ComplexArray:
-    """Amplitudes of a wave at sample points, with the beam's profile where their light starts."""
+    """Amplitudes (points or 1, components) of a wave, with the beam's profile where its light starts."""
     if beam.profile is None:
-        return np.array([wave.amplitude])
+        return wave.amplitude[None]
     at = np.stack([points.x, points.y], axis=1) - wave.origin
-    return np.asarray(wave.amplitude * profile(beam, at @ np.linalg.inv(wave.matrix).T + wave.start))
+    light = profile(beam, at @ np.linalg.inv(wave.matrix).T + wave.start)
+    return np.asarray(wave.amplitude * light[:, None])
 
 
 def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64]:
@@ -222,33 +221,35 @@ def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64
     return np.asarray(np.clip(window, 0, limits), dtype=np.int64)
 
 
-def spread(
-    wave: Wave, region: Region, beam: Beam, period: float, points: Samples, field: ComplexArray,
-    slope: FloatArray,
-) -> None:  # fmt: skip
-    """Add a plane wave to sample points; exact but for rounding.
+def find_contributions(
+    wave: Wave, region: Region, beam: Beam, points: Samples, slope: FloatArray
+) -> FloatArray:
+    """What a plane wave brings to sample points; exact but for rounding.
 
     Parameters
     ----------
     wave : Wave
     region : Region
     beam : Beam
-    period : float, metres
-        The wavelength.
     points : Samples
-    field : (points,) complex128
-        Added to.
     slope : (points, 4) float64, metres a pixel, or (0, 4)
-        Widened, see `raster.spread`.
+        Widened, see `raster_kernels.leaf_contributions`.
+
+    Returns
+    -------
+    (n, 2 + 2 components) float64
+        See `Contributions`.
     """
     from fringetrace.field.wavefront import raster_kernels
 
     window = _window(wave, region, points)
-    if window[0] < window[1] and window[2] < window[3]:
-        back = wave.matrix @ wave.start  # to the corner of the beam's grid
-        raster_kernels.spread_flat(
-            np.linalg.inv(wave.matrix), wave.origin - back, wave.path - wave.gradient @ back,
-            wave.gradient, _light(beam, wave, points), region.kind, *region.low, region.begin,
-            region.pieces, period, points.first, points.x, points.y, points.where_x, points.where_y,
-            points.columns, field, slope, window,
-        )  # fmt: skip
+    if not (window[0] < window[1] and window[2] < window[3]):
+        return np.empty((0, 2 + 2 * len(wave.amplitude)))
+    back = wave.matrix @ wave.start  # to the corner of the beam's grid
+    found: FloatArray = raster_kernels.plane_wave_contributions(
+        np.linalg.inv(wave.matrix), wave.origin - back, wave.path - wave.gradient @ back,
+        wave.gradient, _light(beam, wave, points), region.kind, *region.low, region.begin,
+        region.pieces, points.first, points.x, points.y, points.where_x, points.where_y,
+        points.columns, slope, window,
+    )  # fmt: skip
+    return found

@@ -1,4 +1,4 @@
-"""Tubes of neighbouring rays: differences across a grid of them, and the caustics that they have passed."""
+"""Ray tubes: derivatives across a grid of rays, and the caustics they have passed (KMAH index)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STENCILS = (
 
 
 def differences(values: FloatArray, axis: int) -> FloatArray:
-    """Derivative along an axis of a grid, to fourth order where five neighbours are there.
+    """Derivative along an axis of a grid, of fourth order where five neighbours exist.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def differences(values: FloatArray, axis: int) -> FloatArray:
 
 
 def along_grid(values: FloatArray) -> FloatArray:
-    """Derivatives of values along the columns and the rows of a grid.
+    """Derivatives along the columns and the rows of a grid.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def _across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
 def caustics(
     way: FloatArray, arrival: FloatArray, last: FloatArray, slopes: Callable[[FloatArray], FloatArray]
 ) -> npt.NDArray[np.int64]:
-    """Caustics that each ray of a sheet has passed (KMAH index): principal wavefront curvatures count.
+    """Caustics that each ray has passed (KMAH index), from principal wavefront curvatures.
 
     Between two surfaces the ray tube has the cross-section det(Q0 + s Q1), where Q0 and Q1 are the
     differentials of position and direction across the ray. Q1 Q0^-1 is the wavefront's curvature,

@@ -1,4 +1,4 @@
-"""Paths to be looked at: a sample of them, point by point, with optical path and phase at any wavelength."""
+"""Ray polylines to draw: a sample of paths with optical path and phase at each point."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, FloatArray, checked_wavelength, path_phase
 from fringetrace.instruments import Mark
 from fringetrace.scene import CCD, Beam
-from fringetrace.tracing import Fate, Paths, at_wavelength, segment_media
+from fringetrace.tracing import Fate, Paths, Segments, at_wavelength, surface_phase
 
 # Routes that have a name of their own; one more is for all the rest.
 ROUTES = 6
@@ -24,14 +24,14 @@ RANGE = 0.8, 1.25
 
 @dataclass(frozen=True, eq=False)
 class Strands:
-    """Paths point by point: m of them, k points each (start, hits, end), padded with NaN or -1.
+    """Ray polylines: m paths of k points each (start, hits, end), padded with NaN or -1.
 
     Attributes
     ----------
     points : (m, k, 3) float64, metres
         The last one is on the chip itself, or a bit on where light left.
     starts : (m, k - 1, 3) float64, metres
-        Where each leg starts: beside its point, where an element displaced the light.
+        Where each segment starts: beside its point, where an element displaced the light.
     opl : (m, k) float64, metres
         Optical path from the start, at the wavelength of the picture; on the chip that to its plane of focus.
     phase : (w, m, k) float64, turns from 0 to 1
@@ -48,7 +48,7 @@ class Strands:
     through : (m, k - 2) bool
         Whether light went on through it.
     index : (m, k - 1) float64
-        Real refractive index along each leg.
+        Real refractive index along each segment.
     row, beam, ray, fate, bounces, route : (m,) int64
     power : (m,) float64
         With which the path ends, relative to unit amplitude.
@@ -87,16 +87,16 @@ class Strands:
 
     @property
     def shown(self) -> int:
-        """Rays that are shown."""
+        """Numbers of the rays that are shown."""
         return len(np.unique(np.stack([self.beam, self.ray]), axis=1).T)
 
     @property
     def caption(self) -> str:
-        """How many rays there are, and how many of them are shown."""
+        """Caption: number of rays, and how many of them are shown."""
         return f"{self.shown:,} of {self.rays:,} rays" if self.shown < self.rays else f"{self.rays:,} rays"
 
     def legs(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Path and bounce of every leg: it goes from start [path, bounce] to point [path, bounce + 1].
+        """Path and bounce of every segment, from start [path, bounce] to point [path, bounce + 1].
 
         Returns
         -------
@@ -116,7 +116,7 @@ def strands(
     sweep: int = 1,
     onward: float = 0.0,
 ) -> Strands:
-    """A sample of paths, as they are drawn.
+    """Ray polylines of a sample of paths.
 
     Parameters
     ----------
@@ -213,24 +213,23 @@ def _strands(
     assert surface is not None
     base = paths.wavelength if wavelength is None else wavelength
     wavelengths, chosen = _sweep(paths, base, sweep)
-    through, medium = segment_media.media(paths)
-    way = segment_media.ways(paths)
-    opl = segment_media.opl(paths, way, medium, base)
+    segments, launched = Segments.of(paths), getattr(paths.source, "length", None)
+    brought = 0.0 if launched is None else launched[paths.ray]
+    opl = segments.optical_path(brought)
     phases = []
     for one in wavelengths:
         there = at_wavelength(paths, float(one))
-        turns = path_phase(segment_media.opl(there, way, medium, one), one) + segment_media.turned(
-            there, through
-        )
+        turns = path_phase(Segments.of(there).optical_path(brought), one)
+        turns = turns + surface_phase(there, segments.through)
         phases.append(np.mod(turns / (2.0 * np.pi), 1.0))
     phase = np.stack(phases) if phases else np.empty((0, *opl.shape))
-    index = segment_media.indices(paths, base)[medium]
     points, starts, beyond = _ended(paths, onward)
-    opl[beyond] += onward * index[beyond[0], beyond[1] - 1]
+    opl[beyond] += onward * segments.index[beyond[0], beyond[1] - 1]
     return Strands(
         points=points, starts=starts, opl=np.where(np.isfinite(points[..., 0]), opl, np.nan), phase=phase,
         steps=_steps(paths, reference), wavelengths=wavelengths, chosen=chosen, surface=surface,
-        through=through, index=index, row=np.arange(len(paths)), beam=np.zeros(len(paths), dtype=np.int64),
+        through=segments.through, index=segments.index, row=np.arange(len(paths)),
+        beam=np.zeros(len(paths), dtype=np.int64),
         ray=paths.ray, fate=paths.fate.astype(np.int64), bounces=paths.bounces.astype(np.int64),
         route=np.zeros(len(paths), dtype=np.int64), power=np.abs(paths.amplitude) ** 2,
         surfaces=tuple(surface.name for surface in paths.scene.surfaces), routes=(), rays=0,
@@ -315,7 +314,7 @@ def _padded(array: Array, axis: int, more: int, name: str) -> Array:
 
 
 def start_of(source: Any, points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Where and to where light of a source starts, and how broad it is.
+    """Start, direction and width of the light of a source.
 
     Parameters
     ----------
