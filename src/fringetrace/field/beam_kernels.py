@@ -17,7 +17,16 @@ import numpy as np
 
 from fringetrace.core import Array, grown, jit, lean, part
 from fringetrace.field.polygon_kernels import (
-    CORNERS, apart, area, box, clip, clipped, copied, grown_polygons, sides,
+    CORNERS,
+    MANY,
+    apart,
+    area,
+    box,
+    clip,
+    clipped,
+    copied,
+    grown_polygons,
+    sides,
 )  # fmt: skip
 
 # Columns of a beam's frame: P, U, V, D, the path at depth 0, and the depth where it starts as an affine
@@ -33,7 +42,7 @@ BOUNDS, BEGIN, END, QUERY = 9, 13, 17, 21
 # there, and their derivatives along x and y (metres a pixel).
 X, Y, PATH, GRADIENT, REAL, IMAGINARY, S, T, DERIVATIVES, WAVE = 0, 1, 2, 3, 5, 6, 7, 8, 9, 13
 # Where power goes.
-DETECTED, LEFT, ABSORBED, TRUNCATED = 0, 1, 2, 3
+DETECTED, LEFT, ABSORBED, TRUNCATED, DROPPED = 0, 1, 2, 3, 4
 # Of so few things ahead each may hide the others; of more the tree tells which do.
 FEW = 12
 # Returned where a table is too small.
@@ -130,6 +139,25 @@ def fill(corners, first, leaves, leaf, begin, boxes):
         for k in range(3):
             boxes[begin + node, k] = 0.5 * (lower[node, k] + upper[node, k]) if full else 0.0
             boxes[begin + node, 3 + k] = 0.5 * (upper[node, k] - lower[node, k]) if full else -1.0
+
+
+@jit
+def planes_of(corners, planes):
+    """Planes n.p + c = 0 of facets, n of unit length."""
+    for i in range(len(corners)):
+        ax, ay, az = (
+            corners[i, 3] - corners[i, 0], corners[i, 4] - corners[i, 1], corners[i, 5] - corners[i, 2],
+        )  # fmt: skip
+        bx, by, bz = (
+            corners[i, 6] - corners[i, 0], corners[i, 7] - corners[i, 1], corners[i, 8] - corners[i, 2],
+        )  # fmt: skip
+        nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        planes[i, 0], planes[i, 1], planes[i, 2] = nx / length, ny / length, nz / length
+        planes[i, 3] = 0.0
+        for k in range(3):
+            middle = (corners[i, k] + corners[i, 3 + k] + corners[i, 6 + k]) / 3.0
+            planes[i, 3] -= planes[i, k] * middle
 
 
 @part
@@ -281,7 +309,11 @@ def sensor(frame, screen, table, row, reach):
 def around(frame, table, row, gap, lines):
     """The lines within which a beam meets a target: those around it, and that beyond which it is ahead."""
     for k in range(LINES):
-        lines[k, 0], lines[k, 1], lines[k, 2] = table[row, 3 * k], table[row, 3 * k + 1], table[row, 3 * k + 2]
+        lines[k, 0], lines[k, 1], lines[k, 2] = (
+            table[row, 3 * k],
+            table[row, 3 * k + 1],
+            table[row, 3 * k + 2],
+        )
     lines[LINES, 0] = table[row, DEPTH + 1] - frame[START + 1]
     lines[LINES, 1] = table[row, DEPTH + 2] - frame[START + 2]
     lines[LINES, 2] = table[row, DEPTH] - frame[START] - gap
@@ -361,31 +393,53 @@ def targets(
 
 
 @lean
-def lit(
-    frame, polygon, count, row, total, last, leaf, corners, planes, surface, boxes, roots, limits, room, table,
-    number, found, pieces, sizes,
-):  # fmt: skip
+def reached(frame, polygon, count, row, limits, room, table, piece, power, strength):
+    """Write the part of a beam that meets a target, if nothing hides it; its corners, 0 if there is none."""
+    around(frame, table, row, limits.gap, room.lines)
+    copied(polygon, count, piece)
+    size = clipped(piece, count, room.lines, LINES + 1, room.spare)
+    if size == MANY:
+        power[DROPPED] += strength * area(polygon, count)
+    elif size >= 3 and area(piece, size) <= limits.area:
+        power[DROPPED] += strength * area(piece, size)
+    elif size >= 3:
+        return size
+    return 0
+
+
+@lean
+def lit_of_few(
+    frame, polygon, count, row, total, limits, room, table, number, pieces, sizes, power, strength
+):
     """Pieces of a beam that reach one of its targets past all others; how many."""
-    lines, spare, rest, tri = room.lines, room.spare, room.rest, number[row, 0]
-    around(frame, table, row, limits.gap, lines)
-    copied(polygon, count, pieces[0])
-    size = clipped(pieces[0], count, lines, LINES + 1, spare)
-    if size < 3 or area(pieces[0], size) <= limits.area:
-        return 0
-    sizes[0, 0] = size
-    left = 1
-    # all of few targets, or the CCD among many
-    for k in range(total if total <= FEW else min(1, total)):
-        if k != row and left > 0 and (total <= FEW or number[k, 0] == SENSOR):
+    sizes[0, 0] = reached(frame, polygon, count, row, limits, room, table, pieces[0], power, strength)
+    left = 1 if sizes[0, 0] > 0 else 0
+    for k in range(total):
+        if k != row and left > 0:
             left = shade(
-                frame, table, row, tri, table, k, number[k, 0], limits, pieces, sizes, left, lines, spare, rest
-            )
-    if total <= FEW or left <= 0:
-        return left
+                frame, table, row, number[row, 0], table, k, number[k, 0], limits, pieces, sizes, left, room.lines,
+                room.spare, room.rest,
+            )  # fmt: skip
+    return left
+
+
+@lean
+def lit_of_many(
+    frame, polygon, count, row, last, leaf, corners, planes, surface, boxes, roots, limits, room, table, number,
+    found, pieces, sizes, power, strength,
+):  # fmt: skip
+    """Pieces of a beam that reach one of its targets past all others that the tree finds; how many."""
+    lines, spare, rest, tri = room.lines, room.spare, room.rest, number[row, 0]
     edges, query, other, whole = room.edges, room.query, room.other, room.part
-    copied(polygon, count, whole)
-    around(frame, table, row, limits.gap, lines)
-    size = clipped(whole, count, lines, LINES + 1, spare)
+    size = reached(frame, polygon, count, row, limits, room, table, whole, power, strength)
+    if size == 0:
+        return 0
+    copied(whole, size, pieces[0])
+    sizes[0, 0], left = size, 1
+    if row > 0 and number[0, 0] == SENSOR:
+        left = shade(
+            frame, table, row, tri, table, 0, SENSOR, limits, pieces, sizes, left, lines, spare, rest
+        )
     many = sides(whole, size, edges)
     low_s, high_s, low_t, high_t = box(whole, size)
     corridor(frame, low_s, high_s, low_t, high_t, table, row, query)
@@ -394,9 +448,7 @@ def lit(
         return FULL
     for k in range(met):
         hider = found[k, 0]
-        if hider == last or hider == tri or surface[hider] < 0 or left <= 0:
-            continue
-        if sight(
+        if hider != last and hider != tri and surface[hider] >= 0 and left > 0 and sight(
             frame, corners, planes, hider, whole, size, query, edges, many, limits.slack, room.at, lines, other,
             0,
         ):  # fmt: skip
@@ -473,9 +525,7 @@ def branch(
             power[TRUNCATED] += incident * share
         elif share > 0.0:
             name = key * optics.base + 2 * whose + 1 + through
-            onward(
-                frame, table, row, piece, corners, amplitude * by, tri, bounces + 1, name, beams, waiting
-            )
+            onward(frame, table, row, piece, corners, amplitude * by, tri, bounces + 1, name, beams, waiting)
             if through == 0:
                 nx, ny, nz, c = planes[tri, 0], planes[tri, 1], planes[tri, 2], planes[tri, 3]
                 mirrored(beams.frame, waiting, nx, ny, nz, c)
@@ -519,11 +569,12 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
     """Follow a beam through all facets to the CCD.
 
     `source` (1, FRAME) is its frame, `section` (4, 2) the rectangle it fills, `leaf` the facets in a leaf.
-    Returns its footprints on the CCD (the last rows of their tables are blank), how many, and the power (4,)
-    that was detected, left, was absorbed, or was truncated, in m^2 of the source.
+    Returns its footprints on the CCD (the last rows of their tables are blank), how many, and the power (5,)
+    that was detected, left, was absorbed, was truncated, and of that which left what was dropped as too
+    narrow, in m^2 of the source.
     """
     corners, planes, surface, boxes, roots = facets
-    room, power = tables(), np.zeros(4)
+    room, power = tables(), np.zeros(5)
     found, hiding = np.empty((256, 1), np.int64), np.empty((256, 1), np.int64)
     table, number = np.empty((256, TARGET)), np.empty((256, 1), np.int64)
     pieces, sizes = np.empty((16, CORNERS, 2)), np.empty((16, 1), np.int64)
@@ -546,7 +597,7 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
             frame[k] = beams.frame[waiting, k]
         copied(beams.polygon[waiting], count, polygon)
         amplitude = complex(beams.amplitude[waiting, 0], beams.amplitude[waiting, 1])
-        gone = area(polygon, count)
+        gone, strength = area(polygon, count), square(amplitude)
         total = FULL
         while total == FULL:
             total = targets(
@@ -558,10 +609,16 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
         for row in range(total):
             left = FULL
             while left == FULL:
-                left = lit(
-                    frame, polygon, count, row, total, last, leaf, corners, planes, surface, boxes, roots,
-                    limits, room, table, number, hiding, pieces, sizes,
-                )  # fmt: skip
+                if total <= FEW:
+                    left = lit_of_few(
+                        frame, polygon, count, row, total, limits, room, table, number, pieces, sizes, power,
+                        strength,
+                    )  # fmt: skip
+                else:
+                    left = lit_of_many(
+                        frame, polygon, count, row, last, leaf, corners, planes, surface, boxes, roots, limits,
+                        room, table, number, hiding, pieces, sizes, power, strength,
+                    )  # fmt: skip
                 if left == FULL:
                     hiding, pieces, sizes = grown(hiding), grown_polygons(pieces), grown(sizes)
             tri = number[row, 0]
@@ -570,13 +627,25 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
                 size = area(pieces[k], sizes[k, 0])
                 gone -= size
                 if tri == SENSOR:
-                    power[DETECTED] += size * square(amplitude)
-                    record(frame, pitch, shape, screen, room.reach, pieces[k], sizes[k, 0], amplitude, key, out, done)
+                    power[DETECTED] += size * strength
+                    record(
+                        frame,
+                        pitch,
+                        shape,
+                        screen,
+                        room.reach,
+                        pieces[k],
+                        sizes[k, 0],
+                        amplitude,
+                        key,
+                        out,
+                        done,
+                    )
                     done += 1
                 else:
                     waiting = branch(
                         frame, table, row, tri, surface[tri], planes, optics, pieces[k], sizes[k, 0], amplitude,
                         bounces, key, beams, waiting, power,
                     )  # fmt: skip
-        power[LEFT] += gone * square(amplitude)
+        power[LEFT] += gone * strength
     return out, done, power

@@ -9,19 +9,34 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import jit, part
+from fringetrace.core import jit, lean, part
 from fringetrace.field.beam_kernels import (
-    DERIVATIVES, GRADIENT, IMAGINARY, PATH, REAL, S, T, X, Y,
+    DERIVATIVES,
+    GRADIENT,
+    IMAGINARY,
+    PATH,
+    REAL,
+    S,
+    T,
+    X,
+    Y,
 )  # fmt: skip
 from fringetrace.field.polygon_kernels import (
-    CORNERS, apart, area, box, clipped, copied, integral, sides,
+    CORNERS,
+    apart,
+    area,
+    box,
+    clipped,
+    copied,
+    integral,
+    sides,
 )  # fmt: skip
 
 # A smaller part of a pixel is rounding; one that misses no more fills it.
 NONE, ALL = 1e-12, 1.0 - 1e-9
 
 
-@jit
+@lean
 def columns_of(corners, begin, end, row, columns):
     """First and last column that a convex polygon reaches in a row of pixels; none if last < first."""
     low, high = np.inf, -np.inf
@@ -42,7 +57,7 @@ def columns_of(corners, begin, end, row, columns):
     return int(max(np.floor(low), 0.0)), int(min(np.floor(high), columns - 1.0))
 
 
-@jit
+@lean
 def cover(corners, first, rows, columns, place, members):
     """Add each footprint to the pixels that it reaches, at place[pixel] of `members`, and step that on."""
     for n in range(len(first) - 1):
@@ -57,24 +72,29 @@ def cover(corners, first, rows, columns, place, members):
                 place[pixel] += 1
 
 
+@jit
+def pixel_sides():
+    """The lines around a pixel, about its centre."""
+    return np.array([[1.0, 0.0, 0.5], [-1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, -1.0, 0.5]])
+
+
 @part
-def cut(corners, first, n, x, y, polygon, spare):
+def cut(corners, first, n, x, y, square, polygon, spare):
     """The part of a footprint that lies in a pixel, about the pixel's centre; its corners."""
     for i in range(first[n + 1] - first[n]):
         polygon[i, 0], polygon[i, 1] = corners[first[n] + i, 0] - x, corners[first[n] + i, 1] - y
-    square = np.array([[1.0, 0.0, 0.5], [-1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.0, -1.0, 0.5]])
     return clipped(polygon, first[n + 1] - first[n], square, 4, spare)
 
 
 @jit
 def sources(columns, corners, first, begin, members, waves, at):
     """Where in the source the light of each member comes from: s and t of the middle of its part."""
-    polygon, spare = np.empty((CORNERS, 2)), np.empty((CORNERS, 2))
+    polygon, spare, square = np.empty((CORNERS, 2)), np.empty((CORNERS, 2)), pixel_sides()
     for pixel in range(len(begin) - 1):
         for k in range(begin[pixel], begin[pixel + 1]):
             wave = waves[members[k]]
             x, y = pixel % columns + 0.5, pixel // columns + 0.5
-            count = cut(corners, first, members[k], x, y, polygon, spare)
+            count = cut(corners, first, members[k], x, y, square, polygon, spare)
             x, y = x - wave[X], y - wave[Y]
             for i in range(count):
                 x, y = x + polygon[i, 0] / count, y + polygon[i, 1] / count
@@ -83,14 +103,14 @@ def sources(columns, corners, first, begin, members, waves, at):
 
 
 @part
-def phasor(wave, x, y, period):
+def phasor(waves, n, x, y, period):
     """A wave at a point: the remainder is exact, so long paths cost no digits."""
-    way = wave[PATH] + wave[GRADIENT] * (x - wave[X]) + wave[GRADIENT + 1] * (y - wave[Y])
+    way = waves[n, PATH] + waves[n, GRADIENT] * (x - waves[n, X]) + waves[n, GRADIENT + 1] * (y - waves[n, Y])
     angle = 2.0 * np.pi * ((way % period) / period)
-    return complex(wave[REAL], wave[IMAGINARY]) * complex(np.cos(angle), np.sin(angle))
+    return complex(waves[n, REAL], waves[n, IMAGINARY]) * complex(np.cos(angle), np.sin(angle))
 
 
-@jit
+@lean
 def overlap(polygons, sizes, areas, boxes, lines, many, a, b, gx, gy, spare, rest):
     """Integral of exp(i g.x) over what two parts of a pixel share."""
     if boxes[a, 0] >= boxes[b, 1] or boxes[b, 0] >= boxes[a, 1]:
@@ -117,7 +137,8 @@ def overlap(polygons, sizes, areas, boxes, lines, many, a, b, gx, gy, spare, res
 
 @jit
 def means(
-    top, bottom, columns, corners, first, begin, members, waves, group, weight, period, carrier, mean, mutual
+    top, bottom, columns, corners, first, begin, members, waves, group, sign, profile, period, carrier, mean,
+    mutual
 ):  # fmt: skip
     """Mean fields of groups over the pixels of some rows (if `carrier`), and means of E_m conj(E_n)."""
     most = 1
@@ -127,13 +148,13 @@ def means(
     sizes, many, whose = np.zeros(most, np.int64), np.zeros(most, np.int64), np.zeros(most, np.int64)
     areas, boxes, slope = np.zeros(most), np.empty((most, 4)), np.empty((most, 2))
     amplitude = np.empty(most, np.complex128)
-    spare, rest = np.empty((CORNERS, 2)), np.empty((CORNERS, 2))
+    spare, rest, square = np.empty((CORNERS, 2)), np.empty((CORNERS, 2)), pixel_sides()
     for pixel in range(top * columns, bottom * columns):
         x, y = pixel % columns + 0.5, pixel // columns + 0.5
         count = 0
         for k in range(begin[pixel], begin[pixel + 1]):
-            wave = waves[members[k]]
-            sizes[count] = cut(corners, first, members[k], x, y, polygons[count], spare)
+            n = members[k]
+            sizes[count] = cut(corners, first, n, x, y, square, polygons[count], spare)
             if sizes[count] < 3:
                 continue
             areas[count] = area(polygons[count], sizes[count])
@@ -142,10 +163,12 @@ def means(
             boxes[count, 0], boxes[count, 1], boxes[count, 2], boxes[count, 3] = box(
                 polygons[count], sizes[count]
             )
-            amplitude[count] = phasor(wave, x, y, period) * (weight[k] if len(weight) > 0 else 1.0)
+            amplitude[count] = phasor(waves, n, x, y, period) * sign[n]
+            if len(profile) > 0:
+                amplitude[count] *= profile[k]
             for axis in range(2):
-                slope[count, axis] = 2.0 * np.pi * wave[GRADIENT + axis] / period
-            many[count], whose[count] = 0, group[members[k]]
+                slope[count, axis] = 2.0 * np.pi * waves[n, GRADIENT + axis] / period
+            many[count], whose[count] = 0, group[n]
             count += 1
         for a in range(count):
             one, m = amplitude[a], whose[a]

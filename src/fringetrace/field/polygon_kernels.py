@@ -12,6 +12,8 @@ from fringetrace.core import jit, lean, part
 
 # Corners of a polygon, at most: a triangle cut by the sides of several more.
 CORNERS = 24
+# Returned where it would have more.
+MANY = -1
 # Below this squared phase (radians) across a polygon its integral is a series: 1e-4 squared remains.
 FLAT_PHASE = 1e-4
 
@@ -120,7 +122,7 @@ def clip(polygon, corners, a, b, c, result):
 
 @lean
 def clipped(polygon, corners, lines, count, spare):
-    """Keep of a polygon what lies inside some lines, in place; its corners, 0 if nothing is left."""
+    """Keep of a polygon what lies inside some lines, in place; its corners, 0 for none, or `MANY`."""
     for k in range(count):
         a, b, c = lines[k, 0], lines[k, 1], lines[k, 2]
         inside = True
@@ -130,7 +132,7 @@ def clipped(polygon, corners, lines, count, spare):
             continue
         corners = clip(polygon, corners, a, b, c, spare)
         if corners < 3 or corners >= CORNERS:
-            return 0
+            return MANY if corners >= CORNERS else 0
         copied(spare, corners, polygon)
     return corners
 

@@ -29,24 +29,26 @@ def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> Comp
     """
     if chosen(paths, method) == "rays":
         return ray_sums(paths, mark, wavelength)
-    fields = complex_field(paths, wavelength, groups=mark.count(paths), method="wavefront")
+    fields = complex_field(paths, wavelength, groups=mark.count(paths), method=method)
     return _padded(fields, 1)
 
 
-def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
-    """Mean over each pixel of E_m conj(E_n), for the light of each count of a mark, by the wavefront method.
+def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float, method: str) -> ComplexArray:
+    """Mean over each pixel of E_m conj(E_n), for the light of each count of a mark.
 
     Parameters
     ----------
     paths, mark, wavelength
         See `arm_fields`.
+    method : {"auto", "facets", "wavefront"}
+        Not the sum of rays, which has no inside of pixels.
 
     Returns
     -------
     (n, n, rows, columns) complex128, n at least 2
         Summed over the components of polarised light.
     """
-    return _padded(mutual_intensity(paths, wavelength, groups=mark.count(paths), method="wavefront"), 2)
+    return _padded(mutual_intensity(paths, wavelength, groups=mark.count(paths), method=method), 2)
 
 
 def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:

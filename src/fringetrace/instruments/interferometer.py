@@ -241,7 +241,7 @@ class Interferometer:
             paths = self.trace(light)
             if chosen(paths, self.method) == "rays":  # the fields are kept, too
                 return products(self.fields(light))
-            return arm_mutual_intensity(paths, self.arms.reference, light)
+            return arm_mutual_intensity(paths, self.arms.reference, light, self.method)
         spectrum = self.spectrum(light)
         total = np.zeros((2, 2, *self.ccd.shape), dtype=np.complex128)
         for wavelength, share in zip(spectrum.wavelengths.tolist(), spectrum.weights, strict=True):
