@@ -417,16 +417,16 @@ def lit_of_few(
     for k in range(total):
         if k != row and left > 0:
             left = shade(
-                frame, table, row, number[row, 0], table, k, number[k, 0], limits, pieces, sizes, left, room.lines,
-                room.spare, room.rest,
+                frame, table, row, number[row, 0], table, k, number[k, 0], limits, pieces, sizes, left,
+                room.lines, room.spare, room.rest,
             )  # fmt: skip
     return left
 
 
 @lean
 def lit_of_many(
-    frame, polygon, count, row, last, leaf, corners, planes, surface, boxes, roots, limits, room, table, number,
-    found, pieces, sizes, power, strength,
+    frame, polygon, count, row, last, leaf, corners, planes, surface, boxes, roots, limits, room, table,
+    number, found, pieces, sizes, power, strength,
 ):  # fmt: skip
     """Pieces of a beam that reach one of its targets past all others that the tree finds; how many."""
     lines, spare, rest, tri = room.lines, room.spare, room.rest, number[row, 0]
@@ -449,8 +449,8 @@ def lit_of_many(
     for k in range(met):
         hider = found[k, 0]
         if hider != last and hider != tri and surface[hider] >= 0 and left > 0 and sight(
-            frame, corners, planes, hider, whole, size, query, edges, many, limits.slack, room.at, lines, other,
-            0,
+            frame, corners, planes, hider, whole, size, query, edges, many, limits.slack, room.at, lines,
+            other, 0,
         ):  # fmt: skip
             left = shade(
                 frame, table, row, tri, other, 0, hider, limits, pieces, sizes, left, lines, spare, rest
@@ -601,8 +601,8 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
         total = FULL
         while total == FULL:
             total = targets(
-                frame, polygon, count, last, leaf, corners, planes, surface, boxes, roots, screen, limits, room,
-                table, number, found,
+                frame, polygon, count, last, leaf, corners, planes, surface, boxes, roots, screen, limits,
+                room, table, number, found,
             )  # fmt: skip
             if total == FULL:
                 found, table, number = grown(found), grown(table), grown(number)
@@ -616,8 +616,8 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
                     )  # fmt: skip
                 else:
                     left = lit_of_many(
-                        frame, polygon, count, row, last, leaf, corners, planes, surface, boxes, roots, limits,
-                        room, table, number, hiding, pieces, sizes, power, strength,
+                        frame, polygon, count, row, last, leaf, corners, planes, surface, boxes, roots,
+                        limits, room, table, number, hiding, pieces, sizes, power, strength,
                     )  # fmt: skip
                 if left == FULL:
                     hiding, pieces, sizes = grown(hiding), grown_polygons(pieces), grown(sizes)
@@ -644,8 +644,8 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
                     done += 1
                 else:
                     waiting = branch(
-                        frame, table, row, tri, surface[tri], planes, optics, pieces[k], sizes[k, 0], amplitude,
-                        bounces, key, beams, waiting, power,
+                        frame, table, row, tri, surface[tri], planes, optics, pieces[k], sizes[k, 0],
+                        amplitude, bounces, key, beams, waiting, power,
                     )  # fmt: skip
         power[LEFT] += gone * strength
     return out, done, power

@@ -42,8 +42,8 @@ class FacetWaves:
         Where the members of each pixel begin.
     member : (m,) int32
         Footprints that reach it.
-    profile : (m,) float64, or (0,)
-        Amplitude of the beam where the light of each member comes from.
+    profile : (m, 5) float64, or (0, 5)
+        Amplitude of the beam where the light of each member comes from, and its tilt, see `_linear`.
     paths : int
         Number of paths.
     missed : float
@@ -254,7 +254,7 @@ def _reconstructed(parts: list[Paths]) -> FacetWaves:
     prints = found[0] if len(found) == 1 else _together(found)
     begin, member = _covered(prints, ccd.shape)
     waves = FacetWaves(
-        ccd, prints, np.concatenate(path), np.concatenate(odd), begin, member, np.empty(0), before,
+        ccd, prints, np.concatenate(path), np.concatenate(odd), begin, member, np.empty((0, 5)), before,
         missed / detected if detected > 0.0 else 0.0,
     )  # fmt: skip
     owner = np.repeat(np.arange(len(found)), [len(one) for one in found])
@@ -310,14 +310,42 @@ def _profiled(waves: FacetWaves, beams: list[Beam], owner: npt.NDArray[np.int64]
     profiles: list[Callable[..., FloatArray] | None] = [beam.profile for beam in beams]
     if all(profile is None for profile in profiles):
         return waves
-    at = np.zeros((len(waves.member), 2))
-    prints = waves.footprints
+    prints, count = waves.footprints, len(waves.member)
+    middle, at = np.empty((count, 5)), np.empty((count, 4, 2))
     kernels.sources(
-        waves.ccd.shape[1], prints.corners, prints.first, waves.begin, waves.member, prints.wave, at
+        waves.ccd.shape[1], prints.corners, prints.first, waves.begin, waves.member, prints.wave, middle, at
     )
-    amplitude = np.ones(len(at))
+    table = np.tile((1.0, 0.0, 0.0, 0.0, 0.0), (count, 1))
     for number, profile in enumerate(profiles):
-        mine = owner[waves.member] == number
+        mine = np.flatnonzero(owner[waves.member] == number)
         if profile is not None:
-            amplitude[mine] = profile(*at[mine].T)
-    return replace(waves, profile=amplitude)
+            values = np.broadcast_to(profile(*at[mine].reshape(-1, 2).T), 4 * len(mine)).reshape(-1, 4)
+            table[mine] = _linear(values, middle[mine])
+    return replace(waves, profile=table)
+
+
+def _linear(values: FloatArray, middle: FloatArray) -> FloatArray:
+    """Amplitudes about parts of pixels: root of the mean power, relative gradient, and this at the centroid.
+
+    Parameters
+    ----------
+    values : (m, 4)
+        At the points of `kernels.sources`.
+    middle : (m, 5) float64
+        As there.
+
+    Returns
+    -------
+    (m, 5) float64
+        Real and imaginary part, gradient a pixel along x and y, and its product with the centroid.
+    """
+    mean, power = values.mean(axis=1), (np.abs(values) ** 2).mean(axis=1)
+    amplitude = np.exp(1j * np.angle(mean)) * np.sqrt(power)
+    x, y, along, shear, up = middle.T
+    some = (along > 0.0) & (up > 0.0) & (mean != 0.0)
+    change = np.divide(
+        values[:, ::2] - values[:, 1::2], 2.0 * mean[:, None], where=some[:, None], out=0.0 * values[:, :2]
+    )
+    rise = np.divide(change[:, 1].real, up, where=some, out=np.zeros(len(up)))
+    run = np.divide(change[:, 0].real - shear * rise, along, where=some, out=np.zeros(len(up)))
+    return np.stack([amplitude.real, amplitude.imag, run, rise, run * x + rise * y], axis=1)
