@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, tables
+from fringetrace.core import Array, FloatArray, short_repr, tables
 from fringetrace.field import chosen
 from fringetrace.geometry import Mesh, interpolate_height, write_height_map
 from fringetrace.instruments import Interferometer, path_slope, records, step_axis, tiff
@@ -61,6 +61,8 @@ class Measurement:
     residual: FloatArray
     smooth: Array
     ledger: Ledger
+
+    __repr__ = short_repr
 
     @property
     def interferogram(self) -> FloatArray:
@@ -157,7 +159,7 @@ def measure_height(
     Measurement
     """
     # a pixel that is averaged shows a mean of both sides of a step
-    averaged = chosen(bench.trace(wavelength), bench.method) == "wavefront"
+    averaged = chosen(bench.trace(wavelength), bench.method) != "rays"
     bend = STEP * wavelength if averaged else math.inf
     height = bench.height(wavelength, steps)
     both = np.isfinite(height) & np.isfinite(truth)
