@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,32 +16,37 @@ from fringetrace.scene import Scene, Surface
 if TYPE_CHECKING:
     from fringetrace.optics import Element, Material
 
-# As in `refractions`, which takes a second to load.
+# What a surface is: of constant amplitudes, or a boundary between two media.
 CONSTANT, BOUNDARY = 0, 1
+# What is followed from a boundary: bits. What is not, is lost to the metal behind it if that is OPAQUE.
 REFLECTED, TRANSMITTED, OPAQUE = 1, 2, 4
 FOLLOW = {"both": REFLECTED | TRANSMITTED, "reflected": REFLECTED, "transmitted": TRANSMITTED}
 # Beyond, float64 keeps nothing of the squares of other indices beside them.
 INDICES = 1e-7, 1e7
 
 
-@dataclass(frozen=True, eq=False)
-class Optics:
-    """What the kernels of `refractions` need to know of a scene.
+class SurfaceTable(NamedTuple):
+    """Surfaces and media of a scene at a wavelength, as the kernels take them.
 
     Attributes
     ----------
-    kind, reflection, transmission, front, back, media, follow
-        For each surface what it is, its amplitudes if they are constant, the numbers of its media, which
-        branches are followed; of each medium the complex index.
+    kind : (surfaces,) int8
+        `CONSTANT` or `BOUNDARY`.
+    reflection, transmission : (surfaces,) complex128
+        Amplitudes where they are constant, see `constants`.
+    front, back : (surfaces,) int32
+        Numbers of the media beside each surface.
+    media : (media,) complex128
+        Refractive indices.
+    follow : (surfaces,) int8
+        Which branches are followed: bits.
     film : tuple
         Where the layers of each surface begin, and their indices and thicknesses from front to back and
         from back to front.
     k0 : float, 1/m
         2 pi over the wavelength, 0 where nothing depends on it.
-    wavelength : float or None, metres
-    polarised : bool
-    elements : dict
-        Thin elements by the number of their surface.
+    ideal : bool
+        All surfaces reflect with -1 in a vacuum, so that amplitudes follow from the number of bounces.
     """
 
     kind: npt.NDArray[np.int8]
@@ -53,26 +58,40 @@ class Optics:
     follow: npt.NDArray[np.int8]
     film: tuple[Array, ComplexArray, Array, tuple[ComplexArray, Array]]
     k0: float
+    ideal: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Optics:
+    """What light meets in a scene.
+
+    Attributes
+    ----------
+    surfaces : SurfaceTable
+    vacuum : bool
+        Light meets nothing but constant amplitudes in a vacuum.
+    wavelength : float or None, metres
+    polarised : bool
+    elements : dict
+        Thin elements by the number of their surface.
+    """
+
+    surfaces: SurfaceTable
+    vacuum: bool
     wavelength: float | None
     polarised: bool
     elements: dict[int, Element]
 
     @property
-    def columns(self) -> tuple[Array, ...]:
-        """The tables of surfaces and media."""
-        return (
-            self.kind, self.reflection, self.transmission, self.front, self.back, self.media, self.follow,
-        )  # fmt: skip
-
-    @property
     def fading(self) -> bool:
         """Whether some medium absorbs."""
-        return bool(self.media.imag.any())
+        return bool(self.surfaces.media.imag.any())
 
     @property
-    def branches(self) -> int:
-        """Branches that a ray may split into at one surface."""
-        return max([2, *(element.branches for element in self.elements.values())])
+    def splits(self) -> bool:
+        """Whether a ray may have several ends."""
+        table = self.surfaces
+        return not self.vacuum or bool((abs(table.reflection) * abs(table.transmission)).any())
 
 
 def materials(scene: Scene) -> tuple[Material, ...]:
@@ -140,7 +159,7 @@ def needs(scene: Scene) -> str | None:
     return None
 
 
-def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | None:
+def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
     """The media, boundaries and elements of a scene at a wavelength.
 
     Parameters
@@ -152,8 +171,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
 
     Returns
     -------
-    Optics or None
-        None where light meets nothing but constant amplitudes in a vacuum.
+    Optics
 
     Raises
     ------
@@ -163,9 +181,8 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
     """
     if wavelength is not None:
         wavelength = checked_wavelength(wavelength)
-    if plain(scene, polarised):
-        return None
-    why = needs(scene)
+    vacuum = plain(scene, polarised)
+    why = None if vacuum else needs(scene)
     if wavelength is None and why is not None:
         raise ValueError(f"trace wavelength: expected one, since {why}, got None")
     elements = thin(scene)
@@ -173,25 +190,29 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         if element.polarised and not polarised:
             name = scene.surfaces[number].name
             raise ValueError(f"{name}: expected light with a polarisation, got a scalar beam")
+    table = _table(scene, 1.0 if wavelength is None else wavelength, vacuum)
+    if wavelength is not None:
+        table = table._replace(k0=2.0 * math.pi / wavelength)
+    return Optics(table, vacuum, None if vacuum else wavelength, polarised, elements)
+
+
+def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:
     known = materials(scene)
-    at = 1.0 if wavelength is None else wavelength
     numbers = {medium: number for number, medium in enumerate(known)}
     sides = [[s.front or scene.around, s.back or scene.around] for s in scene.surfaces]
-    table = np.array([[numbers[medium] for medium in side] for side in sides], dtype=np.int32)
+    beside = np.array([[numbers[medium] for medium in side] for side in sides], dtype=np.int32)
     reflection, transmission = constants(scene)
-    return Optics(
+    return SurfaceTable(
         kind=np.array([BOUNDARY if s.boundary else CONSTANT for s in scene.surfaces], dtype=np.int8),
         reflection=reflection,
         transmission=transmission,
-        front=table[:, 0].copy(),
-        back=table[:, 1].copy(),
-        media=np.array([_index(medium, at) for medium in known]),
+        front=beside[:, 0].copy(),
+        back=beside[:, 1].copy(),
+        media=np.array([_index(medium, wavelength) for medium in known]),
         follow=np.array([_followed(surface) for surface in scene.surfaces], dtype=np.int8),
-        film=_layers(scene, at),
-        k0=0.0 if wavelength is None else 2.0 * math.pi / wavelength,
-        wavelength=wavelength,
-        polarised=polarised,
-        elements=elements,
+        film=_layers(scene, wavelength),
+        k0=0.0,
+        ideal=vacuum and bool((reflection == -1.0).all() and not transmission.any()),
     )
 
 

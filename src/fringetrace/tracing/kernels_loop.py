@@ -1,0 +1,329 @@
+"""Compiled passes of the tracing loop: rays bounce, split, end, and close up.
+
+`interact` is the general pass. Where light meets nothing but constant amplitudes in a vacuum, `light` is
+None, and numba leaves out all that is about media. `rebound` is the same pass for ideal mirrors in one
+body, together with its search for hits: half as long again without it (benchmarks/loop.py).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fringetrace.core import jit, part
+from fringetrace.optics import bare, coated
+from fringetrace.tracing.fates import ABSORBED, ALIVE, FAINT
+from fringetrace.tracing.intersect.kernels import (  # fmt: skip
+    EDGE,
+    LEAVING,
+    MARGIN,
+    NX,
+    NY,
+    NZ,
+    crossing,
+    restart,
+    reviewed,
+    unsure,
+)
+from fringetrace.tracing.kernels_boundary import (
+    branches,
+    followed,
+    power,
+    reflected,
+    refracted,
+    scaled,
+    square,
+    strength,
+)
+from fringetrace.tracing.kernels_rays import (
+    fated,
+    latest,
+    read_hit,
+    read_ray,
+    write_end,
+    write_last,
+    write_lengths,
+    write_matter,
+    write_path,
+    write_power,
+    write_ray,
+    write_vector,
+)
+from fringetrace.tracing.optics_table import BOUNDARY, CONSTANT
+
+
+@part
+def copy_light(light, row, target, to, polarised, fading):
+    """Copy what a row carries through media to a row of the same or another table."""
+    write_matter(target, to, light.medium[row], light.real_index[row], light.dropped[row], light.bend[row])
+    write_lengths(light.lengths, row, target.lengths, to)
+    for k in range(3):
+        if polarised:
+            target.field[to, k] = light.field[row, k]
+        if fading:
+            target.fade[to, k] = light.fade[row, k]
+
+
+@jit
+def compact(batch, light, start, stop, to, why, ends, end_light, ended):
+    """Move the rows of a batch from `start` to `stop` up to row `to`, but for those that end here.
+
+    `why` is what becomes of each. Returns how many rows of the batch and of the ends are filled.
+    """
+    polarised, fading = False, False
+    if light is not None:
+        fading, polarised = len(light.fade) > 0, len(light.field) > 0
+    for row in range(start, stop):  # to <= start: nothing is overwritten before it is read
+        key, ray, bounces, serial = batch.key[row], batch.ray[row], batch.bounces[row], batch.serial[row]
+        lost, amplitude, reflections = batch.lost[row], batch.amplitude[row], batch.reflections[row]
+        if why[row] != ALIVE:
+            x, y, z, dx, dy, dz, way = read_ray(batch.state, row)
+            write_end(ends, ended, x, y, z, dx, dy, dz, way, why[row])
+            write_path(ends, ended, key, ray, bounces, serial)
+            write_power(ends, ended, lost, amplitude, reflections)
+            if light is not None:
+                copy_light(light, row, end_light, ended, polarised, fading)
+            ended += 1
+            continue
+        if to < row:
+            for k in range(batch.state.shape[1]):
+                batch.state[to, k] = batch.state[row, k]
+            came = batch.came
+            write_last(batch, to, batch.last[row], came[row, 0], came[row, 1], came[row, 2])
+            write_path(batch, to, key, ray, bounces, serial)
+            write_power(batch, to, lost, amplitude, reflections)
+            if light is not None:
+                copy_light(light, row, light, to, polarised, fading)
+        to += 1
+    return to, ended
+
+
+@jit
+def interact(
+    count, batch, light, met, triangle, owner, surfaces, limits, ends, end_light, ended, first, serials, why,
+    parent, contradictions,
+):  # fmt: skip
+    """Send each ray to what it meets and on from there; write down those that end, close up the rest.
+
+    A ray that splits goes on as its reflected branch; transmitted ones follow behind all rows, `parent`
+    is filled with the row (as it was) that each of them comes from, and they are numbered from `serials` on.
+    Rays at elements stand where they came, as they came. Ends go to row `ray - first`, or, if `first` is
+    negative, one after the other from `ended` on. `contradictions` counts, for each surface, the rays that
+    came in another medium than it has there. Where all surfaces are `ideal` amplitudes follow from bounces.
+    Returns how many rays go on, how many have ended, and the next serial number.
+    """
+    # not taken apart further: what branches over arrays would count references, 170 ns a ray
+    state, came, lost, amplitude, reflections = (
+        batch.state, batch.came, batch.lost, batch.amplitude, batch.reflections,
+    )  # fmt: skip
+    key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
+    ideal, faint = surfaces.ideal, limits.faint
+    base = np.uint64(limits.key_base)
+    polarised, fading = False, False
+    if light is not None:
+        fading, polarised = len(light.fade) > 0, len(light.field) > 0
+        medium, indices, lengths, fades, fields = (
+            light.medium, light.real_index, light.lengths, light.fade, light.field,
+        )  # fmt: skip
+        dropped, bend = light.dropped, light.bend
+    kept, born = 0, 0
+    for row in range(count):
+        x, y, z, dx, dy, dz, way = read_ray(state, row)
+        px, py, pz, nx, ny, nz, path, rim = read_hit(met, row)
+        here, steps, number, name = key[row], bounces[row], ray[row], serial[row]
+        value, field, gone, mirrored = 1.0 + 0.0j, (1.0 + 0.0j, 0j, 0j, 0j), 0.0, steps
+        if not ideal:
+            value, gone, mirrored = amplitude[row], lost[row], reflections[row]
+            if polarised:
+                if light is not None:
+                    field = 0j, fields[row, 0], fields[row, 1], fields[row, 2]
+            else:
+                field = value, 0j, 0j, 0j
+        k = triangle[row]
+        fate, reach = fated(limits, steps, k >= 0, path, x, y, z, dx, dy, dz)
+        step = path if fate == ALIVE else reach
+        if light is None:
+            way += step
+        else:
+            inside, index, aside, steepest = medium[row], indices[row], dropped[row], bend[row]
+            f = (0.0, 0.0, 0.0)
+            if fading:
+                f = fades[row, 0], fades[row, 1], fades[row, 2]
+            lengths[row, inside] += step
+            way += step * index
+            fade = f[0] * dx + f[1] * dy + f[2] * dz
+            if fade > 0.0:  # below by rounding alone: waves in passive media do not grow along the ray
+                factor = np.exp(-surfaces.k0 * fade * step)
+                gone += power(field, polarised) * (1.0 - factor * factor)
+                field = scaled(field, factor)
+                value = strength(field, polarised)
+        if fate == ALIVE:
+            surface = owner[np.uintp(k)]
+            x, y, z, steps = px, py, pz, steps + 1
+            here = here * base + np.uint64(2 * surface + 1)
+            bx, by, bz = latest(path, dx, dy, dz, came[row, 0], came[row, 1], came[row, 2])
+            facing = nx * dx + ny * dy + nz * dz
+            h = reflected(dx, dy, dz, nx, ny, nz, facing, steps)
+            t = dx, dy, dz
+            back, through, returns, passes = field, field, 1.0, 0.0
+            if light is None:
+                if not ideal:
+                    r, s = surfaces.reflection[surface], surfaces.transmission[surface]
+                    back, through = (field[0] * r, 0j, 0j, 0j), (field[0] * s, 0j, 0j, 0j)
+                    returns, passes = square(back[0]), square(through[0])
+                    gone += square(field[0]) - returns - passes
+                    mirrored += returns > 0.0 and passes == 0.0
+            else:
+                d, n, front = (dx, dy, dz), (nx, ny, nz), facing < 0.0
+                fade = f[0] * nx + f[1] * ny + f[2] * nz
+                beyond, q1 = inside, complex(index * abs(facing), -fade if front else fade)
+                rs, ts, q2 = surfaces.reflection[surface], surfaces.transmission[surface], q1
+                rp, tp = -rs, ts
+                if surfaces.kind[surface] == BOUNDARY:
+                    mine, beyond = surfaces.front[surface], surfaces.back[surface]
+                    mine, beyond = (mine, beyond) if front else (beyond, mine)
+                    contradictions[surface] += inside != mine
+                    steepest = max(steepest, 1.0 - facing * facing)
+                    inner, outer = surfaces.media[inside], surfaces.media[beyond]
+                    if surfaces.film[0][surface + 1] > surfaces.film[0][surface]:
+                        rs, rp, ts, tp, q2 = coated(
+                            surfaces.film, surface, front, inner, outer, q1, surfaces.k0
+                        )
+                    else:
+                        rs, rp, ts, tp, q2 = bare(inner, outer, q1)
+                beside, u = index, f
+                if q1 != q2:
+                    t, beside, u = refracted(
+                        index, surfaces.media[inside], surfaces.media[beyond], q1, q2, facing, d, f, n
+                    )
+                back, through = branches(field, d, h, t, n, rs, rp, ts, tp, polarised)
+                passes, returns = power(through, polarised), power(back, polarised)
+                spent = power(field, polarised) - passes - returns
+                returns, passes, absorbed, skipped = followed(surfaces.follow[surface], returns, passes)
+                gone, aside = gone + spent + absorbed, aside + skipped
+                mirrored += surfaces.kind[surface] == CONSTANT and returns > 0.0 and passes == 0.0
+            if returns > 0.0:
+                if passes > 0.0:
+                    new = count + born
+                    if light is not None:
+                        write_matter(light, new, beyond, beside, 0.0, steepest)
+                        write_lengths(lengths, row, lengths, new)
+                        if fading:
+                            write_vector(fades, new, u[0], u[1], u[2])
+                        if polarised:
+                            write_vector(fields, new, through[1], through[2], through[3])
+                    write_ray(state, new, x, y, z, t[0], t[1], t[2], nx, ny, nz, way, rim)
+                    write_last(batch, new, k, bx, by, bz)
+                    write_path(batch, new, here + np.uint64(1), number, steps, serials + born)
+                    write_power(batch, new, 0.0, strength(through, polarised), mirrored)
+                    why[new] = FAINT if passes < faint else ALIVE
+                    parent[born], born = row, born + 1
+                (dx, dy, dz), field = h, back
+                if light is not None and fading:
+                    f = f[0] - 2.0 * fade * nx, f[1] - 2.0 * fade * ny, f[2] - 2.0 * fade * nz
+                fate = FAINT if returns < faint else ALIVE
+            elif passes > 0.0:
+                here += np.uint64(1)
+                (dx, dy, dz), field = t, through
+                if light is not None:
+                    inside, index, f = beyond, beside, u
+                fate = FAINT if passes < faint else ALIVE
+            else:
+                field, fate = (0j, 0j, 0j, 0j), ABSORBED
+            value = strength(field, polarised)
+        if fate == ALIVE:
+            write_ray(state, kept, x, y, z, dx, dy, dz, nx, ny, nz, way, rim)
+            write_last(batch, kept, k, bx, by, bz)
+            write_path(batch, kept, here, number, steps, name)
+            if not ideal:
+                write_power(batch, kept, gone, value, mirrored)
+            if light is not None:
+                write_matter(light, kept, inside, index, aside, steepest)
+                if kept < row:
+                    write_lengths(lengths, row, lengths, kept)
+                if fading:
+                    write_vector(fades, kept, f[0], f[1], f[2])
+                if polarised:
+                    write_vector(fields, kept, field[1], field[2], field[3])
+            kept += 1
+            continue
+        end = number - first if first >= 0 else ended
+        write_end(ends, end, x + reach * dx, y + reach * dy, z + reach * dz, dx, dy, dz, way, fate)
+        write_path(ends, end, here, number, steps, name)
+        if not ideal:
+            write_power(ends, end, gone, value, mirrored)
+        if light is not None:
+            write_matter(end_light, end, inside, index, aside, steepest)
+            write_lengths(lengths, row, end_light.lengths, end)
+            if fading:
+                write_vector(end_light.fade, end, f[0], f[1], f[2])
+            if polarised:
+                write_vector(end_light.field, end, field[1], field[2], field[3])
+        ended += 1
+    kept, ended = compact(batch, light, count, count + born, kept, why, ends, end_light, ended)
+    return kept, ended, serials + born
+
+
+@jit
+def rebound(count, steps, prim, batch, body, digit, limits, ends, first, origin32, direction32):
+    """`measure`, `interact` and `aim` in one, for a single body of ideal mirrors that all rays just left.
+
+    Each has made `steps` bounces. `digit` is what a triangle adds to a key.
+
+    Returns how many rays go on, how many have ended, and how many hits were doubtful.
+    """
+    key, ray, state, last, came = batch.key, batch.ray, batch.state, batch.last, batch.came
+    _, _, oriented, closed, frame, planes, _, _ = body
+    cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
+    unscale, margin = 1.0 / scale, frame[5]
+    base = np.uint64(limits.key_base)
+    kept, ended, doubtful = 0, 0, 0
+    many = base > np.uint64(3)  # else there is one surface, and one digit
+    for row in range(count):
+        guess = np.int64(prim[row])
+        gx, gy, gz, dx, dy, dz, way = read_ray(state, row)
+        x, y, z = (gx - cx) * scale, (gy - cy) * scale, (gz - cz) * scale
+        leaving, edge = state[row, LEAVING], state[row, EDGE]
+        facing, inverted, path, px, py, pz, rim = 0.0, 0.0, np.inf, x, y, z, np.inf
+        if guess >= 0:
+            k = np.uintp(guess)
+            facing, inverted, path, px, py, pz, rim = crossing(planes, k, x, y, z, dx, dy, dz)
+        doubt = unsure(guess, guess == last[row], path, facing, True, leaving, closed)
+        if doubt or rim <= MARGIN or edge < margin:
+            unclear, guess, (path, px, py, pz, rim) = reviewed(
+                (x, y, z, dx, dy, dz), (came[row, 0], came[row, 1], came[row, 2]),
+                (state[row, NX], state[row, NY], state[row, NZ]), last[row], leaving, edge, guess, facing,
+                (path, px, py, pz, rim), doubt, body,
+            )  # fmt: skip
+            doubtful += unclear
+            if guess >= 0:
+                k = np.uintp(guess)
+                facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
+                inverted = 1.0 / facing
+        path = path * unscale if guess >= 0 else np.inf
+        fate, reach = fated(limits, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz)
+        if fate != ALIVE:
+            end = ray[row] - first
+            ends.key[end], ends.ray[end], ends.bounces[end] = key[row], ray[row], steps
+            write_end(
+                ends, end, gx + reach * dx, gy + reach * dy, gz + reach * dz, dx, dy, dz, way + reach, fate
+            )
+            ended += 1
+            continue
+        if not oriented:  # nobody else asks from where a ray came
+            came[kept, 0], came[kept, 1], came[kept, 2] = latest(
+                path, dx, dy, dz, came[row, 0], came[row, 1], came[row, 2]
+            )
+        k = np.uintp(guess)
+        nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
+        height = nx * px + ny * py + nz * pz + planes[k, 3]
+        x, y, z = px - height * nx, py - height * ny, pz - height * nz
+        dx, dy, dz = reflected(dx, dy, dz, nx, ny, nz, facing, steps + 1)
+        gx, gy, gz = cx + x * unscale, cy + y * unscale, cz + z * unscale
+        write_ray(state, kept, gx, gy, gz, dx, dy, dz, nx, ny, nz, way + path, rim)
+        state[kept, LEAVING], last[kept] = -facing, guess
+        key[kept], ray[kept] = key[row] * base + np.uint64(digit[k] if many else 1), ray[row]
+        x, y, z = restart(x, y, z, dx, dy, dz, nx, ny, nz, -facing, abs(inverted))
+        origin32[kept, 0], origin32[kept, 1], origin32[kept, 2] = x, y, z
+        direction32[kept, 0], direction32[kept, 1], direction32[kept, 2] = dx, dy, dz
+        kept += 1
+    return kept, ended, doubtful
