@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import jit, part
+from fringetrace.core import jit
 from fringetrace.optics import bare, coated
 from fringetrace.tracing.fates import ABSORBED, ALIVE, FAINT
 from fringetrace.tracing.intersect.kernels import (  # fmt: skip
@@ -41,7 +41,6 @@ from fringetrace.tracing.kernels_rays import (
     read_ray,
     write_end,
     write_last,
-    write_lengths,
     write_matter,
     write_path,
     write_power,
@@ -51,48 +50,62 @@ from fringetrace.tracing.kernels_rays import (
 from fringetrace.tracing.optics_table import BOUNDARY, CONSTANT
 
 
-@part
-def copy_light(light, row, target, to, polarised, fading):
-    """Copy what a row carries through media to a row of the same or another table."""
-    write_matter(target, to, light.medium[row], light.real_index[row], light.dropped[row], light.bend[row])
-    write_lengths(light.lengths, row, target.lengths, to)
-    for k in range(3):
-        if polarised:
-            target.field[to, k] = light.field[row, k]
-        if fading:
-            target.fade[to, k] = light.fade[row, k]
-
-
 @jit
 def compact(batch, light, start, stop, to, why, ends, end_light, ended):
     """Move the rows of a batch from `start` to `stop` up to row `to`, but for those that end here.
 
     `why` is what becomes of each. Returns how many rows of the batch and of the ends are filled.
     """
-    polarised, fading = False, False
+    state, last, came = batch.state, batch.last, batch.came
+    key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
+    lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
+    origin, direction, length, fate = ends.origin, ends.direction, ends.length, ends.fate
+    end_key, end_ray, end_bounces, end_serial = ends.key, ends.ray, ends.bounces, ends.serial
+    end_lost, end_amplitude, end_reflections = ends.lost, ends.amplitude, ends.reflections
     if light is not None:
         fading, polarised = len(light.fade) > 0, len(light.field) > 0
+        medium, indices, lengths = light.medium, light.real_index, light.lengths
+        fades, fields, dropped, bend = light.fade, light.field, light.dropped, light.bend
+        end_medium, end_indices, end_lengths = end_light.medium, end_light.real_index, end_light.lengths
+        end_fades, end_fields = end_light.fade, end_light.field
+        end_dropped, end_bend = end_light.dropped, end_light.bend
     for row in range(start, stop):  # to <= start: nothing is overwritten before it is read
-        key, ray, bounces, serial = batch.key[row], batch.ray[row], batch.bounces[row], batch.serial[row]
-        lost, amplitude, reflections = batch.lost[row], batch.amplitude[row], batch.reflections[row]
+        here, number, steps, name = key[row], ray[row], bounces[row], serial[row]
+        gone, value, mirrored = lost[row], amplitude[row], reflections[row]
         if why[row] != ALIVE:
-            x, y, z, dx, dy, dz, way = read_ray(batch.state, row)
-            write_end(ends, ended, x, y, z, dx, dy, dz, way, why[row])
-            write_path(ends, ended, key, ray, bounces, serial)
-            write_power(ends, ended, lost, amplitude, reflections)
+            x, y, z, dx, dy, dz, way = read_ray(state, row)
+            write_end(origin, direction, length, fate, ended, x, y, z, dx, dy, dz, way, why[row])
+            write_path(end_key, end_ray, end_bounces, end_serial, ended, here, number, steps, name)
+            write_power(end_lost, end_amplitude, end_reflections, ended, gone, value, mirrored)
             if light is not None:
-                copy_light(light, row, end_light, ended, polarised, fading)
+                write_matter(
+                    end_medium, end_indices, end_dropped, end_bend, ended, medium[row], indices[row],
+                    dropped[row], bend[row],
+                )  # fmt: skip
+                for m in range(lengths.shape[1]):
+                    end_lengths[ended, m] = lengths[row, m]
+                for k in range(fades.shape[1] if fading else 0):
+                    end_fades[ended, k] = fades[row, k]
+                for k in range(fields.shape[1] if polarised else 0):
+                    end_fields[ended, k] = fields[row, k]
             ended += 1
             continue
         if to < row:
-            for k in range(batch.state.shape[1]):
-                batch.state[to, k] = batch.state[row, k]
-            came = batch.came
-            write_last(batch, to, batch.last[row], came[row, 0], came[row, 1], came[row, 2])
-            write_path(batch, to, key, ray, bounces, serial)
-            write_power(batch, to, lost, amplitude, reflections)
+            for k in range(state.shape[1]):
+                state[to, k] = state[row, k]
+            write_last(last, came, to, last[row], came[row, 0], came[row, 1], came[row, 2])
+            write_path(key, ray, bounces, serial, to, here, number, steps, name)
+            write_power(lost, amplitude, reflections, to, gone, value, mirrored)
             if light is not None:
-                copy_light(light, row, light, to, polarised, fading)
+                write_matter(
+                    medium, indices, dropped, bend, to, medium[row], indices[row], dropped[row], bend[row]
+                )
+                for m in range(lengths.shape[1]):
+                    lengths[to, m] = lengths[row, m]
+                for k in range(fades.shape[1] if fading else 0):
+                    fades[to, k] = fades[row, k]
+                for k in range(fields.shape[1] if polarised else 0):
+                    fields[to, k] = fields[row, k]
         to += 1
     return to, ended
 
@@ -112,19 +125,25 @@ def interact(
     Returns how many rays go on, how many have ended, and the next serial number.
     """
     # not taken apart further: what branches over arrays would count references, 170 ns a ray
-    state, came, lost, amplitude, reflections = (
-        batch.state, batch.came, batch.lost, batch.amplitude, batch.reflections,
-    )  # fmt: skip
+    state, last, came = batch.state, batch.last, batch.came
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
+    lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
+    end_origin, end_direction, end_length, end_fate = ends.origin, ends.direction, ends.length, ends.fate
+    end_key, end_ray, end_bounces, end_serial = ends.key, ends.ray, ends.bounces, ends.serial
+    end_lost, end_amplitude, end_reflections = ends.lost, ends.amplitude, ends.reflections
+    kind, reflection, transmission = surfaces.kind, surfaces.reflection, surfaces.transmission
     ideal, faint = surfaces.ideal, limits.faint
     base = np.uint64(limits.key_base)
     polarised, fading = False, False
     if light is not None:
         fading, polarised = len(light.fade) > 0, len(light.field) > 0
-        medium, indices, lengths, fades, fields = (
-            light.medium, light.real_index, light.lengths, light.fade, light.field,
-        )  # fmt: skip
-        dropped, bend = light.dropped, light.bend
+        medium, indices, lengths = light.medium, light.real_index, light.lengths
+        fades, fields, dropped, bend = light.fade, light.field, light.dropped, light.bend
+        end_medium, end_indices, end_lengths = end_light.medium, end_light.real_index, end_light.lengths
+        end_fades, end_fields = end_light.fade, end_light.field
+        end_dropped, end_bend = end_light.dropped, end_light.bend
+        front_of, back_of, media, follow = surfaces.front, surfaces.back, surfaces.media, surfaces.follow
+        film, layers = surfaces.film, surfaces.film[0]
     kept, born = 0, 0
     for row in range(count):
         x, y, z, dx, dy, dz, way = read_ray(state, row)
@@ -167,7 +186,7 @@ def interact(
             back, through, returns, passes = field, field, 1.0, 0.0
             if light is None:
                 if not ideal:
-                    r, s = surfaces.reflection[surface], surfaces.transmission[surface]
+                    r, s = reflection[surface], transmission[surface]
                     back, through = (field[0] * r, 0j, 0j, 0j), (field[0] * s, 0j, 0j, 0j)
                     returns, passes = square(back[0]), square(through[0])
                     gone += square(field[0]) - returns - passes
@@ -176,45 +195,45 @@ def interact(
                 d, n, front = (dx, dy, dz), (nx, ny, nz), facing < 0.0
                 fade = f[0] * nx + f[1] * ny + f[2] * nz
                 beyond, q1 = inside, complex(index * abs(facing), -fade if front else fade)
-                rs, ts, q2 = surfaces.reflection[surface], surfaces.transmission[surface], q1
+                rs, ts, q2 = reflection[surface], transmission[surface], q1
                 rp, tp = -rs, ts
-                if surfaces.kind[surface] == BOUNDARY:
-                    mine, beyond = surfaces.front[surface], surfaces.back[surface]
+                if kind[surface] == BOUNDARY:
+                    mine, beyond = front_of[surface], back_of[surface]
                     mine, beyond = (mine, beyond) if front else (beyond, mine)
                     contradictions[surface] += inside != mine
                     steepest = max(steepest, 1.0 - facing * facing)
-                    inner, outer = surfaces.media[inside], surfaces.media[beyond]
-                    if surfaces.film[0][surface + 1] > surfaces.film[0][surface]:
-                        rs, rp, ts, tp, q2 = coated(
-                            surfaces.film, surface, front, inner, outer, q1, surfaces.k0
-                        )
+                    inner, outer = media[inside], media[beyond]
+                    if layers[surface + 1] > layers[surface]:
+                        rs, rp, ts, tp, q2 = coated(film, surface, front, inner, outer, q1, surfaces.k0)
                     else:
                         rs, rp, ts, tp, q2 = bare(inner, outer, q1)
                 beside, u = index, f
                 if q1 != q2:
-                    t, beside, u = refracted(
-                        index, surfaces.media[inside], surfaces.media[beyond], q1, q2, facing, d, f, n
-                    )
+                    t, beside, u = refracted(index, media[inside], media[beyond], q1, q2, facing, d, f, n)
                 back, through = branches(field, d, h, t, n, rs, rp, ts, tp, polarised)
                 passes, returns = power(through, polarised), power(back, polarised)
                 spent = power(field, polarised) - passes - returns
-                returns, passes, absorbed, skipped = followed(surfaces.follow[surface], returns, passes)
+                returns, passes, absorbed, skipped = followed(follow[surface], returns, passes)
                 gone, aside = gone + spent + absorbed, aside + skipped
-                mirrored += surfaces.kind[surface] == CONSTANT and returns > 0.0 and passes == 0.0
+                mirrored += kind[surface] == CONSTANT and returns > 0.0 and passes == 0.0
             if returns > 0.0:
                 if passes > 0.0:
                     new = count + born
                     if light is not None:
-                        write_matter(light, new, beyond, beside, 0.0, steepest)
-                        write_lengths(lengths, row, lengths, new)
+                        write_matter(medium, indices, dropped, bend, new, beyond, beside, 0.0, steepest)
+                        for m in range(lengths.shape[1]):
+                            lengths[new, m] = lengths[row, m]
                         if fading:
                             write_vector(fades, new, u[0], u[1], u[2])
                         if polarised:
                             write_vector(fields, new, through[1], through[2], through[3])
                     write_ray(state, new, x, y, z, t[0], t[1], t[2], nx, ny, nz, way, rim)
-                    write_last(batch, new, k, bx, by, bz)
-                    write_path(batch, new, here + np.uint64(1), number, steps, serials + born)
-                    write_power(batch, new, 0.0, strength(through, polarised), mirrored)
+                    write_last(last, came, new, k, bx, by, bz)
+                    write_path(
+                        key, ray, bounces, serial, new, here + np.uint64(1), number, steps, serials + born
+                    )
+                    sent = strength(through, polarised)
+                    write_power(lost, amplitude, reflections, new, 0.0, sent, mirrored)
                     why[new] = FAINT if passes < faint else ALIVE
                     parent[born], born = row, born + 1
                 (dx, dy, dz), field = h, back
@@ -232,14 +251,15 @@ def interact(
             value = strength(field, polarised)
         if fate == ALIVE:
             write_ray(state, kept, x, y, z, dx, dy, dz, nx, ny, nz, way, rim)
-            write_last(batch, kept, k, bx, by, bz)
-            write_path(batch, kept, here, number, steps, name)
+            write_last(last, came, kept, k, bx, by, bz)
+            write_path(key, ray, bounces, serial, kept, here, number, steps, name)
             if not ideal:
-                write_power(batch, kept, gone, value, mirrored)
+                write_power(lost, amplitude, reflections, kept, gone, value, mirrored)
             if light is not None:
-                write_matter(light, kept, inside, index, aside, steepest)
+                write_matter(medium, indices, dropped, bend, kept, inside, index, aside, steepest)
                 if kept < row:
-                    write_lengths(lengths, row, lengths, kept)
+                    for m in range(lengths.shape[1]):
+                        lengths[kept, m] = lengths[row, m]
                 if fading:
                     write_vector(fades, kept, f[0], f[1], f[2])
                 if polarised:
@@ -247,17 +267,19 @@ def interact(
             kept += 1
             continue
         end = number - first if first >= 0 else ended
-        write_end(ends, end, x + reach * dx, y + reach * dy, z + reach * dz, dx, dy, dz, way, fate)
-        write_path(ends, end, here, number, steps, name)
+        x, y, z = x + reach * dx, y + reach * dy, z + reach * dz
+        write_end(end_origin, end_direction, end_length, end_fate, end, x, y, z, dx, dy, dz, way, fate)
+        write_path(end_key, end_ray, end_bounces, end_serial, end, here, number, steps, name)
         if not ideal:
-            write_power(ends, end, gone, value, mirrored)
+            write_power(end_lost, end_amplitude, end_reflections, end, gone, value, mirrored)
         if light is not None:
-            write_matter(end_light, end, inside, index, aside, steepest)
-            write_lengths(lengths, row, end_light.lengths, end)
+            write_matter(end_medium, end_indices, end_dropped, end_bend, end, inside, index, aside, steepest)
+            for m in range(lengths.shape[1]):
+                end_lengths[end, m] = lengths[row, m]
             if fading:
-                write_vector(end_light.fade, end, f[0], f[1], f[2])
+                write_vector(end_fades, end, f[0], f[1], f[2])
             if polarised:
-                write_vector(end_light.field, end, field[1], field[2], field[3])
+                write_vector(end_fields, end, field[1], field[2], field[3])
         ended += 1
     kept, ended = compact(batch, light, count, count + born, kept, why, ends, end_light, ended)
     return kept, ended, serials + born
@@ -272,6 +294,8 @@ def rebound(count, steps, prim, batch, body, digit, limits, ends, first, origin3
     Returns how many rays go on, how many have ended, and how many hits were doubtful.
     """
     key, ray, state, last, came = batch.key, batch.ray, batch.state, batch.last, batch.came
+    end_key, end_ray, end_bounces = ends.key, ends.ray, ends.bounces
+    origin, direction, length, end_fate = ends.origin, ends.direction, ends.length, ends.fate
     _, _, oriented, closed, frame, planes, _, _ = body
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
     unscale, margin = 1.0 / scale, frame[5]
@@ -303,10 +327,9 @@ def rebound(count, steps, prim, batch, body, digit, limits, ends, first, origin3
         fate, reach = fated(limits, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz)
         if fate != ALIVE:
             end = ray[row] - first
-            ends.key[end], ends.ray[end], ends.bounces[end] = key[row], ray[row], steps
-            write_end(
-                ends, end, gx + reach * dx, gy + reach * dy, gz + reach * dz, dx, dy, dz, way + reach, fate
-            )
+            end_key[end], end_ray[end], end_bounces[end] = key[row], ray[row], steps
+            gx, gy, gz, way = gx + reach * dx, gy + reach * dy, gz + reach * dz, way + reach
+            write_end(origin, direction, length, end_fate, end, gx, gy, gz, dx, dy, dz, way, fate)
             ended += 1
             continue
         if not oriented:  # nobody else asks from where a ray came

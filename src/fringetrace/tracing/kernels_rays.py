@@ -69,54 +69,41 @@ def write_ray(state, row, x, y, z, dx, dy, dz, nx, ny, nz, way, edge):
 
 
 @part
-def write_end(ends, row, x, y, z, dx, dy, dz, way, fate):
+def write_end(origin, direction, length, fate, row, x, y, z, dx, dy, dz, way, why):
     """Write where a path ended, and why."""
-    ends.origin[row, 0], ends.origin[row, 1], ends.origin[row, 2] = x, y, z
-    ends.direction[row, 0], ends.direction[row, 1], ends.direction[row, 2] = dx, dy, dz
-    ends.length[row], ends.fate[row] = way, fate
+    origin[row, 0], origin[row, 1], origin[row, 2] = x, y, z
+    direction[row, 0], direction[row, 1], direction[row, 2] = dx, dy, dz
+    length[row], fate[row] = way, why
 
 
 @part
-def write_path(table, row, key, ray, bounces, serial):
+def write_path(key, ray, bounces, serial, row, here, number, steps, name):
     """Write which path a row of a batch or of the ends is."""
-    table.key[row], table.ray[row], table.bounces[row], table.serial[row] = key, ray, bounces, serial
+    key[row], ray[row], bounces[row], serial[row] = here, number, steps, name
 
 
 @part
-def write_power(table, row, lost, amplitude, reflections):
+def write_power(lost, amplitude, reflections, row, gone, value, mirrored):
     """Write what a path has given off and kept."""
-    table.lost[row], table.amplitude[row], table.reflections[row] = lost, amplitude, reflections
+    lost[row], amplitude[row], reflections[row] = gone, value, mirrored
 
 
 @part
-def write_last(batch, row, triangle, bx, by, bz):
+def write_last(last, came, row, triangle, bx, by, bz):
     """Write which triangle a ray has left, and from where it came to it."""
-    batch.last[row] = triangle
-    batch.came[row, 0], batch.came[row, 1], batch.came[row, 2] = bx, by, bz
+    last[row], came[row, 0], came[row, 1], came[row, 2] = triangle, bx, by, bz
 
 
 @part
-def write_matter(light, row, medium, index, dropped, bend):
+def write_matter(medium, index, dropped, bend, row, number, real, aside, steepest):
     """Write in which medium a ray is, its index there, what was not followed, how steeply it was bent."""
-    light.medium[row], light.real_index[row], light.dropped[row], light.bend[row] = (
-        medium,
-        index,
-        dropped,
-        bend,
-    )
+    medium[row], index[row], dropped[row], bend[row] = number, real, aside, steepest
 
 
 @part
 def write_vector(table, row, x, y, z):
     """Write three numbers."""
     table[row, 0], table[row, 1], table[row, 2] = x, y, z
-
-
-@part
-def write_lengths(lengths, row, target, to):
-    """Copy the way in each medium."""
-    for m in range(lengths.shape[1]):
-        target[to, m] = lengths[row, m]
 
 
 @part
@@ -141,12 +128,15 @@ def fated(limits, steps, meets, path, x, y, z, dx, dy, dz):
 @jit
 def begin(start, along, length, first, batch):
     """Fill a batch with rays that have met nothing yet; the amplitude is that of the path alone."""
+    state, last, came = batch.state, batch.last, batch.came
+    key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
+    lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
     for i in range(len(start)):
         x, y, z, dx, dy, dz = start[i, 0], start[i, 1], start[i, 2], along[i, 0], along[i, 1], along[i, 2]
-        write_ray(batch.state, i, x, y, z, dx, dy, dz, 0.0, 0.0, 0.0, length[i], 0.0)
-        write_last(batch, i, -1, dx, dy, dz)
-        write_path(batch, i, np.uint64(0), first + i, 0, i)
-        write_power(batch, i, 0.0, 1.0, 0)
+        write_ray(state, i, x, y, z, dx, dy, dz, 0.0, 0.0, 0.0, length[i], 0.0)
+        write_last(last, came, i, -1, dx, dy, dz)
+        write_path(key, ray, bounces, serial, i, np.uint64(0), first + i, 0, i)
+        write_power(lost, amplitude, reflections, i, 0.0, 1.0, 0)
 
 
 @jit
