@@ -10,17 +10,21 @@ from __future__ import annotations
 import argparse
 import os
 import statistics
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
-import pages
 
 import fringetrace as ft
 from fringetrace import degree, nm, um
 from fringetrace.field import spectral_sum
 from fringetrace.scattering import goniometer
-from fringetrace.scattering.rod_lattice import Lattice
+from fringetrace.scattering.rod_lattice import RodLattice
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 ROUNDS = 3
 THETA = np.arange(-60, 61, 20) * degree
@@ -69,18 +73,18 @@ def plain_trace(origin, direction, start, along, most=100):
     return path, bounces, origin, direction
 
 
-def plain_table(lattice: Lattice, rays: int) -> np.ndarray:
+def plain_table(lattice: RodLattice, rays: int) -> np.ndarray:
     """|sum|^2 of 49 pairs at all wavelengths by plain numpy, in the units of the BRDF."""
     angle = 2.0 * np.pi * np.arange(1, lattice.sides + 1) / lattice.sides
     ring = lattice.radius * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     corners = lattice.centres[:, None] + ring
     start = corners.reshape(-1, 2)
     along = np.roll(corners, -1, axis=1).reshape(-1, 2) - start
-    setup = goniometer.Setup(lattice.scene, rays=(1, rays))
+    lighting = goniometer.Illumination(lattice.scene, rays=(1, rays))
     outs = np.stack([np.sin(THETA), np.cos(THETA)], axis=1)
     table = np.zeros((len(THETA), len(THETA), len(WAVES)))
     for i, theta in enumerate(THETA):
-        light = setup.light(theta, 0.0)
+        light = lighting.light(theta, 0.0)
         path, bounces, origin, direction = plain_trace(
             light.origin[:, ::2], light.direction[:, ::2], start, along
         )
@@ -94,7 +98,7 @@ def plain_table(lattice: Lattice, rays: int) -> np.ndarray:
     return table
 
 
-def ours(lattice: Lattice, rays: int, theta=THETA, waves=WAVES, scene: ft.Scene | None = None):
+def ours(lattice: RodLattice, rays: int, theta=THETA, waves=WAVES, scene: ft.Scene | None = None):
     """The same by the goniometer."""
     scene = lattice.scene if scene is None else scene
     return goniometer.brdf(scene, theta, goniometer.Cones(THETA, HALF), waves, rays=(1, rays))
@@ -102,7 +106,7 @@ def ours(lattice: Lattice, rays: int, theta=THETA, waves=WAVES, scene: ft.Scene 
 
 def beside_numpy(rays: int = 2000) -> list[tuple[str, str]]:
     """49 pairs, 401 wavelengths, 80 rods: seconds of either, and whether they agree."""
-    lattice = Lattice()
+    lattice = RodLattice()
     fast, slow, times = ours(lattice, rays), plain_table(lattice, rays), []
     # a ray within rounding of a vertex may go either way: one in thousands
     error = np.abs(np.sqrt(fast.values[:, 0, :, 0]) - np.sqrt(slow)) / np.sqrt(slow.max())
@@ -146,8 +150,8 @@ def against_rods(rays: int = 100_000) -> list[tuple[str, str]]:
     """Nanoseconds a ray segment, of a trace at 20 degrees, in lattices of more and more rods."""
     times = []
     for columns, rows in ((10, 10), (32, 32), (100, 100)):
-        scene = Lattice(columns, rows).scene
-        light = goniometer.Setup(scene, rays=(1, rays)).light(20 * degree, 0.0)
+        scene = RodLattice(columns, rows).scene
+        light = goniometer.Illumination(scene, rays=(1, rays)).light(20 * degree, 0.0)
         count = ft.trace(scene, light, max_bounces=100).segments
         times.append(
             min(seconds(lambda s=scene, r=light: ft.trace(s, r, max_bounces=100)) for _ in range(ROUNDS))
@@ -159,7 +163,7 @@ def against_rods(rays: int = 100_000) -> list[tuple[str, str]]:
 
 def against_wavelengths(rays: int = 100_000) -> list[tuple[str, str]]:
     """Seconds of a whole incidence at more and more wavelengths."""
-    lattice, times = Lattice(), []
+    lattice, times = RodLattice(), []
     scene = lattice.scene
     for count in (1, 40, 400, 4000):
         waves = np.linspace(300, 700, count) * nm
@@ -174,7 +178,7 @@ def against_wavelengths(rays: int = 100_000) -> list[tuple[str, str]]:
 
 def large(rays: int = 2_000_000) -> list[tuple[str, str]]:
     """10,000 rods of 54 sides, 2 million rays an incidence, all 49 pairs."""
-    lattice = Lattice(200, 50, sides=54)
+    lattice = RodLattice(200, 50, sides=54)
     start = time.perf_counter()
     scene = lattice.scene
     table = ours(lattice, rays, scene=scene)

@@ -56,7 +56,7 @@ def joint(scene: ft.Scene) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     return ((vertices - centre) * scale).astype(np.float32), faces.astype(np.int32), centre, scale
 
 
-def michelson(side: int) -> ft.instruments.Bench:
+def michelson(side: int) -> ft.instruments.Interferometer:
     """A Michelson of side x side rays and pixels that looks at the elevation map."""
     relief, pitch = ft.meshes.elevation_sample(2e-6, 8e-3)
     sample = ft.meshes.height_map(relief, pitch)

@@ -19,15 +19,19 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-import pages
 import scenes
 
 import fringetrace as ft
 from fringetrace import mm, nm
+from fringetrace.tracing.batch import part
 from fringetrace.tracing.intersect.embree import build
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 WAVE = 633 * nm
 ROUNDS = 5
@@ -53,24 +57,27 @@ def columns(paths: ft.Paths) -> list[np.ndarray]:
     return [getattr(paths, name) for name in COLUMNS]
 
 
+ENGINE = "tracing.intersect.embree"
+
+
 @contextlib.contextmanager
-def swapped(name: str, wrap: Callable, *rooms: str) -> Iterator[None]:
-    """Wrap a function of that name in all of some rooms that have it."""
-    there = [room for room in map(import_module, (f"fringetrace.{room}" for room in rooms))]
-    there = [room for room in there if hasattr(room, name)]
+def swapped(name: str, wrap: Callable, *modules: str) -> Iterator[None]:
+    """Wrap a function of that name in all of some modules that have it."""
+    there = [import_module(f"fringetrace.{module}") for module in modules]
+    there = [module for module in there if hasattr(module, name)]
     if not there:
-        raise LookupError(f"skips: expected {name} in one of {', '.join(rooms)}, got none")
+        raise LookupError(f"skips: expected {name} in one of {', '.join(modules)}, got none")
     with contextlib.ExitStack() as stack:
-        for room in there:
-            stack.enter_context(patch.object(room, name, wrap(getattr(room, name))))
+        for module in there:
+            stack.enter_context(patch.object(module, name, wrap(getattr(module, name))))
         yield
 
 
-def without(work: Callable, name: str, wrap: Callable, *rooms: str) -> Callable:
+def without(work: Callable, name: str, wrap: Callable, *modules: str) -> Callable:
     """Work that is done with a function wrapped."""
 
     def off() -> list[np.ndarray]:
-        with swapped(name, wrap, *rooms):
+        with swapped(name, wrap, *modules):
             return work()
 
     return off
@@ -112,7 +119,7 @@ def shut(side: int) -> Skip:
     blocked = bench.shut("reference")
     blocked.trace(threads=1)
 
-    def sample(one: ft.instruments.Bench) -> Callable:
+    def sample(one: ft.instruments.Interferometer) -> Callable:
         def found() -> list[np.ndarray]:
             fresh = replace(one)
             fresh.trace(threads=1)
@@ -126,7 +133,7 @@ def shut(side: int) -> Skip:
 def only_mirrors(side: int) -> Skip:
     """One real pass over the rays a bounce, without amplitudes."""
     work = tracing(*rods(side))
-    general = without(work, "_plan", lambda plan: lambda *a: replace(plan(*a), plain=False), "trace")
+    general = without(work, "_plan", lambda plan: lambda *a: replace(plan(*a), plain=False), "tracing.tracer")
     return Skip("only ideal mirrors: no amplitudes, one pass a bounce", "80 rods in a box", work, general)
 
 
@@ -135,7 +142,7 @@ def in_place(side: int) -> Skip:
     scene, beam = rods(side)
 
     def chunks() -> list[np.ndarray]:
-        return columns(ft.paths.join(list(ft.stream(scene, beam, threads=1))))
+        return columns(ft.tracing.join(list(ft.stream(scene, beam, threads=1))))
 
     return Skip(
         "no ray splits: ends are written in their rows", "80 rods in a box", tracing(scene, beam), chunks
@@ -146,7 +153,9 @@ def culled(side: int) -> Skip:
     """Rays that pass a surface's box, or leave a plane, are not asked."""
     bench = scenes.michelson(side)
     work = tracing(bench.scene, bench.beam, bench.ccd)
-    all_ = without(work, "aim", lambda aim: lambda *a, **k: aim(*a, **{**k, "cull": False}), "engine")
+    all_ = without(
+        work, "aim", lambda aim: lambda *a, **k: aim(*a, **{**k, "cull": False}), "tracing.intersect.embree"
+    )
     return Skip("rays that miss all boxes, or leave a plane, are not asked", "Michelson", work, all_)
 
 
@@ -200,7 +209,7 @@ def dropped(side: int) -> Skip:
             if not (batch.bounces[:rows] == 0).all():
                 finished = first[0] - rows
                 if finished:
-                    idle = ft.rays.part(first[1], 0, finished)
+                    idle = part(first[1], 0, finished)
                     find(engine, idle, finished, type(hits).blank(finished), passed)
             else:
                 kept = {name: column[:rows].copy() for name, column in vars(batch).items()}
@@ -211,7 +220,10 @@ def dropped(side: int) -> Skip:
 
     work = tracing(scene, beam)
     return Skip(
-        "finished rays leave the batch", "80 rods, open", work, without(work, "find", asked, "engine")
+        "finished rays leave the batch",
+        "80 rods, open",
+        work,
+        without(work, "find", asked, ENGINE),
     )
 
 
@@ -251,7 +263,7 @@ def stepped(side: int) -> Skip:
     """Phase steps without another trace or sum."""
     flat = ft.shapes.plate(16 * mm, 16 * mm)
 
-    def tilted(piston: float = 0.0) -> ft.instruments.Bench:
+    def tilted(piston: float = 0.0) -> ft.instruments.Interferometer:
         return ft.instruments.michelson(
             flat, aperture=6 * mm, pixels=(side, side), reference_tilt=(2e-5, 0.0), piston=piston
         )
@@ -279,8 +291,14 @@ def differences(side: int) -> Skip:
     def image() -> list[np.ndarray]:
         return [ft.irradiance(paths, WAVE, "wavefront")]
 
-    rooms = ("sheets", "regions", "field", "quadrature")
-    carrier = without(image, "fringes", lambda real: lambda slope, _: real(slope, True), *rooms)
+    names = ("wavefront.patches", "wavefront.plane_waves", "coherent_sum", "pixel_quadrature")
+    files = [f"field.{name}" for name in names]
+    carrier = without(
+        image,
+        "fringes",
+        lambda real: lambda slope, _: real(slope, True),
+        *files,
+    )
     return Skip("irradiance: sampled for fringes, not for the carrier", "tilted flats", image, carrier)
 
 
@@ -317,7 +335,7 @@ def even(side: int) -> Skip:
     def never(_: Callable) -> Callable:
         return lambda bend, values: np.zeros(values.shape[-2:], dtype=bool)
 
-    sampled = without(image, "_small", never, "quadrature")
+    sampled = without(image, "_small", never, "field.pixel_quadrature")
     return Skip("one sample a pixel where light is even", "paraboloid with form", image, sampled)
 
 
@@ -401,7 +419,7 @@ def extruded(side: int) -> Skip:
 
 def observed(side: int) -> Skip:
     """The rays of one incidence serve all directions that are observed."""
-    lattice = ft.scattering.Lattice(10, 4)
+    lattice = ft.scattering.RodLattice(10, 4)
     theta = np.radians(np.arange(-60, 61, 20))
     waves = np.linspace(400, 700, 16) * nm
     given = {"rays": (1, 16 * side), "threads": 1}
@@ -455,14 +473,14 @@ def measured(case: Skip, rounds: int = ROUNDS) -> tuple[float, float, str]:
     return on, off, alike
 
 
-SECTION = """## What each skip saves
+SECTION = """## Savings of each skip
 
-The same work with a rule that leaves something out and without it, one thread, made by
-`benchmarks/skips.py --write`: medians of {rounds} runs in turn, {rays} rays.
+Each row compares the same work with and without one skip, on one thread: medians of {rounds} alternating
+runs, {rays} rays, made by `benchmarks/skips.py --write`.
 
-Visibility rays are never shot: shadows are found where sheets end, by rays of the beam itself. Of a
-BRDF that is reciprocal `reciprocal=True` sums half of the table (ray sums are so only as far as their rays
-sample it: no row here).
+Visibility rays are never traced: rays of the beam itself locate shadows where wavefronts end. For a
+reciprocal BRDF, `reciprocal=True` sums half of the table (ray sums are reciprocal only as far as their rays
+sample the sample: no row here).
 
 """
 

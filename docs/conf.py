@@ -32,6 +32,7 @@ extensions = [
 ]
 exclude_patterns = ["gallery/*.ipynb", "gallery/*.py", "**.part"]
 nitpicky = True
+nitpick_ignore = [("py:class", "numpy.longdouble")]
 html_theme = "furo"
 html_title = f"fringetrace {release}"
 html_copy_source = False

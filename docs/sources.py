@@ -1,42 +1,88 @@
-"""What the site shows besides pages: the reference, written from docstrings, and what examples leave."""
+"""Sources of the site beside its pages: the reference, written from the folders' doors, and the notebooks."""
 
 from __future__ import annotations
 
+import ast
 import re
 import shutil
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import fringetrace
-
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS.parent / "examples"
-# Rooms that one imports by name, beside those that `import fringetrace` offers.
-FURTHER = (
-    "detectors", "guards", "illumination", "lines", "precision", "rig", "rods", "single", "standards",
-    "waves",
+SOURCE = DOCS.parent / "src" / "fringetrace"
+# The order in which the reference lists the folders: as their imports, the command line first.
+FOLDERS = (
+    "cli", "scenefile", "validation", "views", "instruments", "scattering", "accuracy", "field", "tracing",
+    "scene", "rigorous", "optics", "geometry", "phase", "core",
 )  # fmt: skip
 
 
+def exports(stub: Path) -> dict[str, str]:
+    """Names that a door offers, each with the module that it comes from; a module comes from itself."""
+    found = {}
+    for node in ast.parse(stub.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                found[alias.name] = node.module or alias.name
+    return found
+
+
+def modules(folder: str) -> list[str]:
+    """Public modules of a folder: those that its door offers by name."""
+    return sorted(
+        name for name, origin in exports(SOURCE / folder / "__init__.pyi").items() if name == origin
+    )
+
+
+def summary(name: str) -> str:
+    """First paragraph of a module's docstring, on one line."""
+    return " ".join((import_module(name).__doc__ or "").split("\n\n")[0].split())
+
+
 def page(name: str) -> str:
-    """The page of the reference on a module, in reStructuredText."""
+    """Page of a module, in reStructuredText."""
     return f"{name}\n{'=' * len(name)}\n\n.. automodule:: {name}\n   :members:\n"
 
 
-def overview(rooms: list[str]) -> str:
-    """The first page of the reference: each room with the first sentence of its docstring."""
-    rows = [
-        "| [`fringetrace`](fringetrace.rst) | What comes with `import fringetrace as ft`: `ft.` and a name. |"
-    ]
-    for room in rooms:
-        text = (import_module(f"fringetrace.{room}").__doc__ or "").split("\n\n")[0]
-        rows.append(f"| [`{room}`]({room}.rst) | {' '.join(text.split())} |")
-    toctree = ["```{toctree}", ":hidden:", "fringetrace", *rooms, "```"]
-    return "\n".join(["# Reference", "", "| | |", "|---|---|", *rows, "", *toctree, ""])
+def folder_page(folder: str) -> str:
+    """Page of a folder: the names of its door, and links to its public modules, which document the rest."""
+    own = set(modules(folder))
+    elsewhere = sorted(
+        name
+        for name, origin in exports(SOURCE / folder / "__init__.pyi").items()
+        if origin.split(".")[0] in own and name not in own
+    )
+    text = page(f"fringetrace.{folder}")
+    if not own:
+        return text
+    rows = [f"- :doc:`{folder}.{each}`: {summary(f'fringetrace.{folder}.{each}')}" for each in sorted(own)]
+    toctree = [".. toctree::", "   :hidden:", "", *(f"   {folder}.{each}" for each in sorted(own))]
+    text += f"   :exclude-members: {', '.join(elsewhere)}\n"
+    return "\n".join([text, "Modules", "-------", "", *rows, "", *toctree, ""])
+
+
+def shortcuts() -> str:
+    """Page of the names that `import fringetrace as ft` offers, each linked to where it is documented."""
+    found = exports(SOURCE / "__init__.pyi")
+    rows = ["| name | documented as |", "|---|---|"]
+    for name in sorted((name for name in found if name not in FOLDERS), key=str.lower):
+        rows.append(f"| `ft.{name}` | {{py:obj}}`fringetrace.{found[name]}.{name}` |")
+    text = "After `import fringetrace as ft` these names are in `ft`, without their folder."
+    return "\n".join(["# Shortcuts", "", text, "", *rows, ""])
+
+
+def overview() -> str:
+    """First page of the reference: the folders with their charters."""
+    rows = ["| folder | what it is for |", "|---|---|"]
+    rows += [f"| [`{each}`]({each}.rst) | {summary(f'fringetrace.{each}')} |" for each in FOLDERS]
+    toctree = ["```{toctree}", ":hidden:", "shortcuts", *FOLDERS, "```"]
+    text = "One page a folder; [shortcuts](shortcuts.md) lists the names that `ft.` offers without a folder."
+    return "\n".join(["# Reference", "", text, "", *rows, "", *toctree, ""])
 
 
 def renew(folder: Path, texts: dict[str, str]) -> None:
@@ -52,9 +98,10 @@ def renew(folder: Path, texts: dict[str, str]) -> None:
 
 def write_reference(app: Sphinx) -> None:
     """Write the pages of the reference."""
-    rooms = sorted([*fringetrace._ROOMS, *FURTHER])
-    pages = {f"{room}.rst": page(f"fringetrace.{room}") for room in rooms}
-    renew(DOCS / "reference", pages | {"fringetrace.rst": page("fringetrace"), "index.md": overview(rooms)})
+    texts = {f"{folder}.rst": folder_page(folder) for folder in FOLDERS}
+    for folder in FOLDERS:
+        texts |= {f"{folder}.{each}.rst": page(f"fringetrace.{folder}.{each}") for each in modules(folder)}
+    renew(DOCS / "reference", texts | {"shortcuts.md": shortcuts(), "index.md": overview()})
 
 
 def tidy_gallery(app: Sphinx) -> None:
@@ -84,14 +131,13 @@ def link(app: Sphinx, env: Any, node: Any, content: Any) -> Any:
     """Names in docstrings lead to what they name; those that name nothing of the reference stay code."""
     if node.get("reftype") != "obj":
         return None
-    for start in ("fringetrace", node.get("py:module")):
-        target = f"{start}.{node['reftarget']}"
-        found = env.domains["py"].resolve_xref(
-            env, node.get("refdoc"), app.builder, "obj", target, node, content
-        )
-        if found:
-            return found
-    return content
+    domain, target = env.domains["py"], node["reftarget"]
+    known = [name for name in domain.objects if name == target or name.endswith(f".{target}")]
+    near = [name for name in known if name.startswith(f"{node.get('py:module')}.")] or known
+    if not near:
+        return content
+    shortest = min(near, key=lambda name: (name.count("."), name))
+    return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", shortest, node, content) or content
 
 
 def leavings(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:

@@ -18,7 +18,7 @@ low, high = height[200, 60:180].mean(), height[200, 300:340].mean()
 print(f"dark outside the sample: {image[0, 0]:.3f} of the incident irradiance (reference alone: 0.250)")
 print(f"step: {(high - low) / nm:.4f} nm, made 100 nm high")
 
-left, right = ft.views.pair()
+left, right = ft.views.side_by_side()
 ft.views.interferogram(image, bench.ccd.pitch, left, wavelength=wavelength, title="interferogram")
 ft.views.height(height - low, bench.ccd.pitch, right, title="height from four phase steps")
 ft.views.save(left, "01_step.png")

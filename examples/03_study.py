@@ -39,7 +39,7 @@ for surface in bench.scene.surfaces:
     for corners in surface.mesh.vertices[surface.mesh.faces]:
         side.plot(*corners.T[[0, 2]] / um, color="black", linewidth=2)
 for i in np.flatnonzero(paths.fate == ft.Fate.DETECTED):
-    by_reference = bench.reference in paths.surface[i]
+    by_reference = bench.arms.reference.surface in paths.surface[i]
     side.plot(
         *paths.polyline(i).T[[0, 2]] / um, color="#E69F00" if by_reference else "#0072B2", linewidth=0.8
     )

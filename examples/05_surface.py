@@ -37,7 +37,7 @@ error -= np.nanmedian(error)
 rms = np.sqrt(np.nanmean(error**2))
 print(f"height against the mesh: {rms / nm:.4f} nm rms, {rms / wavelength:.1e} waves")
 
-left, right = ft.views.pair()
+left, right = ft.views.side_by_side()
 ft.views.interferogram(image, bench.ccd.pitch, left, wavelength=wavelength)
 ft.views.height(
     ft.phase.remove_plane(height),

@@ -42,7 +42,7 @@ for name, strip, colour in zip(names, strips, ("#0072B2", "#D55E00"), strict=Tru
     crossing = []
     for wavelength in (450 * nm, 650 * nm):
         seen = bench.trace(wavelength).detected
-        by_reference = seen.visits(bench.reference) == 1
+        by_reference = seen.visits(bench.arms.reference.surface) == 1
         crossing.append(seen.length[~by_reference].mean() - seen.length[by_reference].mean())
     print(
         f"{name}: at 450 nm the paths differ by {(crossing[0] - crossing[1]) / um:.3f} um more than at 650 nm"

@@ -45,7 +45,9 @@ for strip, (name, axis) in zip(strips, {"crossed": (0, 1, 0), "parallel": (1, 0,
     strip.set(title=f"{name} polarisers, number of layers below")
     strip.set_aspect("auto")
     if name == "crossed":
-        colour_plots.spectrum(passed[[0, 2, 5]], waves, curves, labels=["1 layer", "3 layers", "6 layers"])
+        colour_plots.coloured_spectra(
+            passed[[0, 2, 5]], waves, curves, labels=["1 layer", "3 layers", "6 layers"]
+        )
 curves.set(ylabel="part that passes, crossed", ylim=(-0.08, 1.3))
 curves.legend(loc="upper right", ncols=3)
 ft.views.save(figure, "11_polarisers.png")

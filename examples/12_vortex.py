@@ -35,7 +35,7 @@ rim = np.concatenate([phase[20, 20:220], phase[20:220, 219], phase[219, 219:20:-
 turns = ft.phase.wrap(np.diff(rim, append=rim[0])).sum() / (2 * np.pi)
 print(f"the phase winds {turns:.6f} times about the axis, made to wind {charge} times")
 
-left, right = ft.views.pair()
+left, right = ft.views.side_by_side()
 ft.views.interferogram(image, bench.ccd.pitch, left, wavelength=wavelength)
 ft.views.phase(phase, bench.ccd.pitch, right, title="phase from four steps, carrier taken off")
 ft.views.save(left, "12_vortex.png")

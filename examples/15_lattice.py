@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 import fringetrace as ft
 from fringetrace import degree, nm, um
 
-lattice = ft.scattering.Lattice(columns=20, rows=4, radius=65 * nm, pitch=280 * nm)
+lattice = ft.scattering.RodLattice(columns=20, rows=4, radius=65 * nm, pitch=280 * nm)
 turn = ft.vectors.rotation((0, 1, 0), 20 * degree)
 beam = ft.Beam(turn @ [0, 0, 3 * um], turn @ [0, 0, -1], (0, 1, 0), (5.6 * um, 0.1 * um), (1, 2000))
 paths = ft.trace(lattice.scene, beam, max_bounces=100, record=True)

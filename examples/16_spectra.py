@@ -13,7 +13,7 @@ import fringetrace as ft
 from fringetrace import degree, nm, um
 from fringetrace.scattering import goniometer
 
-rods = ft.scattering.Lattice(columns=20, rows=4, radius=65 * nm, pitch=280 * nm)
+rods = ft.scattering.RodLattice(columns=20, rows=4, radius=65 * nm, pitch=280 * nm)
 theta, waves, width = np.arange(-60, 61, 20) * degree, np.arange(300, 701) * nm, 5.6 * um
 
 

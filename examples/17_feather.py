@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import fringetrace as ft
 from fringetrace import nm
-from fringetrace.scattering import colour, rod_studies
+from fringetrace.scattering import RodLattice, colour, rod_studies
 from fringetrace.views.plots import colour_plots
 
 waves = np.arange(400, 701, 5) * nm
@@ -25,7 +25,7 @@ BARBULES = {
 
 curves, labels = [], []
 for name, (period, pitch, diameter, layers) in BARBULES.items():
-    lattice = rod_studies.Lattice(
+    lattice = RodLattice(
         rows=layers, radius=0.5 * diameter * nm, pitch=pitch * nm, spacing=period * nm,
         arrangement="square", rod="melanin", host="keratin", cortex=100 * nm,
     )  # fmt: skip
@@ -47,5 +47,5 @@ seen = colour.xyz(np.array(curves), waves)
 colour_plots.swatches(3 * seen, labels, colours)
 colours.set_title("colours in daylight, three times as bright")
 colours.set_aspect("auto")
-colour_plots.spectrum(curves, waves, panel, labels=labels)
+colour_plots.coloured_spectra(curves, waves, panel, labels=labels)
 ft.views.save(figure, "17_feather.png")

@@ -15,7 +15,7 @@ from fringetrace.optics import films
 from fringetrace.scattering import colour
 from fringetrace.views.plots import colour_plots
 
-waves = colour.samples(8 * um)  # resolves fringes of path differences up to 8 um
+waves = colour.resolving_wavelengths(8 * um)  # resolves fringes of path differences up to 8 um
 path, thick = np.linspace(0, 1800, 361) * nm, np.linspace(0, 1200, 361) * nm
 angle, eye = np.linspace(0, 85, 171) * degree, np.linspace(-29, 85, 400) * degree
 

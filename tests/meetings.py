@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fringetrace.optics.elements import Meeting
+from fringetrace.optics.elements import IncidentRays
 
 EPS = float(np.finfo(np.float64).eps)
 
@@ -14,7 +14,7 @@ def meeting(direction, point=(0.0, 0.0, 0.0), field=1.0, normal=(0.0, 0.0, -1.0)
     rows = [np.broadcast_to(np.asarray(v, dtype=float), (count, 3)).copy() for v in (point, normal)]
     field = np.asarray(field, dtype=complex)
     wide = field.shape[-1:] == (3,)
-    return Meeting(
+    return IncidentRays(
         rows[0],
         direction / np.linalg.norm(direction, axis=1)[:, None],
         rows[1],

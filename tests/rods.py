@@ -3,7 +3,7 @@
 import numpy as np
 
 from fringetrace import nm
-from fringetrace.rigorous.cylinder_gratings import Lattice, Row
+from fringetrace.rigorous.cylinder_gratings import CylinderGratings, Row
 
 
 def keratin(wavelength):
@@ -44,4 +44,4 @@ def feather(period, pitch, cortex, rod, channel, layers, index=melanin, host=ker
             Row((first + (j + 0.5) * period) * nm, channel / 2 * nm, 1.0, pitch / 2 * nm)
             for j in range(layers - 1)
         ]
-    return Lattice(pitch * nm, (cortex + rod + (layers - 1) * period) * nm, rows, host, 1.0, back)
+    return CylinderGratings(pitch * nm, (cortex + rod + (layers - 1) * period) * nm, rows, host, 1.0, back)

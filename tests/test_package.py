@@ -170,3 +170,20 @@ def test_nothing_changes_anything_at_module_level():
     assert not {
         file for file, tree in FILES.items() if any(isinstance(node, ast.Global) for node in ast.walk(tree))
     }
+
+
+# Names with two homes: functions of views are called what they draw, verbs act on nouns of their module.
+SHARED = {"brdf", "height", "work_precision", "save", "load"}
+
+
+def test_no_two_public_things_share_a_name():
+    homes = {}
+    for door in HOME.glob("*/__init__.pyi"):
+        for node in ast.parse(door.read_text()).body:
+            for alias in node.names:
+                homes.setdefault(alias.name, set()).add(f"{door.parent.name}.{node.module}")
+    for file, tree in FILES.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, set()).add(file.replace("/", "."))
+    assert {name: home for name, home in homes.items() if len(home) > 1 and name not in SHARED} == {}

@@ -75,15 +75,15 @@ def test_a_steep_part_of_a_sample_is_named_by_its_place():
 def test_few_rays_tell_of_fringes_on_many_pixels():
     one = bench(0.8, pixels=(64, 64))
     few = ft.trace(one.scene, replace(one.beam, shape=(8, 8)), one.ccd).detected
-    assert "by 1.6 pi" in checks.aliased(few, HENE)
-    assert checks.aliased(few, 2 * HENE) is None
+    assert "by 1.6 pi" in checks.aliasing(few, HENE)
+    assert checks.aliasing(few, 2 * HENE) is None
 
 
 def test_one_wave_has_no_fringes():
     beam = ft.Beam((0, 0, 0.1), (0, 0, -1), (0, 1, 0), (1 * mm, 1 * mm), (64, 64))
     ccd = ft.CCD((0, 0, 1 * um), (0, 0, -1), (0, 1, 0), 1 * mm / 32, (32, 32))
     steep = arrivals.reflected(beam, ccd, arrivals.plane(0.3)).detected
-    assert checks.aliased(steep, HENE) is None
+    assert checks.aliasing(steep, HENE) is None
 
 
 # Starved pixels.
@@ -100,7 +100,7 @@ def test_pixels_without_rays_are_counted():
     paths = spread_light(36)
     counts = np.zeros((40, 40), dtype=int)
     np.add.at(counts, tuple(np.floor(paths.pixel).astype(int).T), 1)
-    text = checks.starved(paths)
+    text = checks.starvation(paths)
     empty, lit, row, column = re.search(
         r"starve: ([\d,]+) of ([\d,]+) lit pixels .* first \[(\d+), (\d+)\]", text
     ).groups()
@@ -109,12 +109,12 @@ def test_pixels_without_rays_are_counted():
     assert number(empty) == pytest.approx(40**2 - 36**2, rel=0.1)
     assert number(lit) == pytest.approx(40**2, rel=0.01)
     wanted = re.search(r"a beam of (\d+) x (\d+) rays", text).groups()
-    assert checks.starved(spread_light(int(wanted[0]))) is None
+    assert checks.starvation(spread_light(int(wanted[0]))) is None
 
 
 @pytest.mark.parametrize("rays", [40, 47, 80])
 def test_pixels_with_rays_do_not_starve(rays):
-    assert checks.starved(spread_light(rays)) is None
+    assert checks.starvation(spread_light(rays)) is None
 
 
 def test_a_few_empty_pixels_are_let_pass():
@@ -125,21 +125,21 @@ def test_a_few_empty_pixels_are_let_pass():
     assert len(inner) > checks.FEW * 40**2
     some = paths.where(~np.isin(number, inner[: int(checks.FEW * 40**2)]))
     more = paths.where(~np.isin(number, inner))
-    assert checks.starved(some) is None
-    assert f"starve: {len(inner)} of" in checks.starved(more)
+    assert checks.starvation(some) is None
+    assert f"starve: {len(inner)} of" in checks.starvation(more)
 
 
 def test_an_image_may_have_dark_parts():
     paths = spread_light(40)
-    assert checks.starved(paths.where(paths.pixel[:, 1] < 20)) is None
-    assert checks.starved(paths.where(np.hypot(*(paths.pixel - 20).T) < 15)) is None
+    assert checks.starvation(paths.where(paths.pixel[:, 1] < 20)) is None
+    assert checks.starvation(paths.where(np.hypot(*(paths.pixel - 20).T) < 15)) is None
 
 
 def test_what_one_wave_lacks_another_does_not_hide():
     paths = spread_light(36)
     full = spread_light(80)
-    both = ft.paths.join([replace(paths, area=None), replace(full, key=full.key + np.uint64(1), area=None)])
-    assert "pixels starve" in checks.starved(both)
+    both = ft.tracing.join([replace(paths, area=None), replace(full, key=full.key + np.uint64(1), area=None)])
+    assert "pixels starve" in checks.starvation(both)
 
 
 # Folds.
@@ -155,7 +155,7 @@ def hollow(place, rays=61):
 def test_a_fold_is_told():
     """Behind the cusp at R/2 rays cross: between the branches of x = R sin^3 t three arrive."""
     place = 160 * um
-    text = checks.folded(hollow(place))
+    text = checks.folding(hollow(place))
     cells, total, _, column = re.search(
         r"folds over the CCD: ([\d,]+) of its ([\d,]+) cells .* pixel \[(-?\d+), (\d+)\]", text
     ).groups()
@@ -173,11 +173,11 @@ def test_a_fold_is_told():
 @pytest.mark.parametrize("place", [100 * um, 240 * um])
 def test_before_the_caustic_and_beyond_it_nothing_folds(place):
     """The caustic of rays up to 30 degrees lies between z = R / 2 and z = .65 R."""
-    assert checks.folded(hollow(place)) is None
+    assert checks.folding(hollow(place)) is None
 
 
 def test_a_mirror_image_is_no_fold():
-    assert checks.folded(bench(0.1).trace().detected) is None
+    assert checks.folding(bench(0.1).trace().detected) is None
 
 
 def test_facets_that_cross_their_light_are_no_caustic():
@@ -187,12 +187,12 @@ def test_facets_that_cross_their_light_are_no_caustic():
     beam = ft.Beam((0, 0, 0.4), (0, 0, -1), (0, 1, 0), (5 * mm, 3 * mm), (20, 100))
     ccd = ft.CCD((0, 0, 0.5), (0, 0, -1), (0, 1, 0), 80 * um, (40, 64))
     paths = ft.trace(ft.Scene([ft.Surface(mesh, ft.Mirror())]), beam, ccd).detected
-    assert checks.folded(paths) is None
+    assert checks.folding(paths) is None
 
 
 def test_loose_rays_have_no_folds():
     paths = hollow(160 * um)
-    assert checks.folded(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)]))) is None
+    assert checks.folding(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)]))) is None
 
 
 # Foci and cusps.
@@ -208,7 +208,7 @@ def place_told(text):
 @pytest.mark.parametrize("rays", [60, 61])
 def test_the_line_of_the_cusp_is_told(rays):
     """On the plane z = R / 2 rays arrive at x = R t^3, to lowest order, by 11 rows of the beam."""
-    text = checks.focused(hollow(150 * um, rays), HENE)
+    text = checks.focusing(hollow(150 * um, rays), HENE)
     count, _, column = place_told(text)
     assert text.startswith("a wave comes to a focus or a cusp on the CCD: ")
     assert count == 11 * (1 + (rays == 60))
@@ -218,7 +218,7 @@ def test_the_line_of_the_cusp_is_told(rays):
 @pytest.mark.parametrize("place", [20, 140, 149, 151, 160, 240])
 def test_folds_and_what_is_before_them_are_not(place):
     """The wavefront method knows folds in their uniform form."""
-    assert checks.focused(hollow(place * um), HENE) is None
+    assert checks.focusing(hollow(place * um), HENE) is None
 
 
 def test_a_cusp_is_told_by_its_place():
@@ -226,7 +226,7 @@ def test_a_cusp_is_told_by_its_place():
     beam = ft.Beam((0, 0, 0), (0, 0, 1), (0, 1, 0), (300 * um, 60 * um), (16, 62))
     ccd = ft.CCD((0, 0, 150 * um), (0, -0.25, 1), (0, 1, 0), 5 * um, (16, 60))
     paths = arrivals.reflected(beam, ccd, arrivals.cylinder(300 * um)).detected
-    count, row, column = place_told(checks.focused(paths, HENE))
+    count, row, column = place_told(checks.focusing(paths, HENE))
     assert count <= 6
     assert abs(row - 8) <= 1
     assert abs(column - 30) <= 1
@@ -256,13 +256,13 @@ def test_light_through_the_axis_of_a_sphere_is_told():
         ccd = ft.CCD((0, 0, 0), (0, 0, 1), (0, 1, 0), 10 * um, (200, 200), focus=place * mm)
         paths = ft.trace(ft.Scene([sphere]), beam, ccd)
         assert len(paths.detected) > 880
-        assert (checks.focused(paths.detected, HENE) is not None) == told
+        assert (checks.focusing(paths.detected, HENE) is not None) == told
 
 
 def test_flat_facets_and_loose_rays_have_no_foci():
-    assert checks.focused(bench(0.1).trace().detected, HENE) is None
+    assert checks.focusing(bench(0.1).trace().detected, HENE) is None
     paths = hollow(150 * um)
-    assert checks.focused(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE) is None
+    assert checks.focusing(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE) is None
 
 
 # Costly facets.
@@ -321,12 +321,12 @@ def test_all_there_is_to_say_of_an_image_comes_at_once():
     along = np.linspace(-6 * mm, 6 * mm, 13)
     mesh = shapes.height_map(-(along**2 + along[:, None] ** 2) / 10.0, 1 * mm)
     bad = bench(0.8, pixels=(48, 48), sample=mesh)
-    costs, notes = checks.judged(bad.trace(), HENE, "rays")
+    costs, notes = checks.judge(bad.trace(), HENE, "rays")
     assert costs == ft.budget(bad.trace(), HENE, "rays")
     assert [note[:12] for note in notes] == ["fringes alia", "facets cost "]
     assert notes[:1] == checks.found(bad.trace(), HENE, "rays")
     good = bench(0.1)
-    assert checks.judged(good.trace(), HENE)[1] == []
+    assert checks.judge(good.trace(), HENE)[1] == []
 
 
 def test_an_image_without_light_has_nothing_to_tell():

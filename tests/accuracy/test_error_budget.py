@@ -8,7 +8,7 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import instruments, mm, nm
-from fringetrace.accuracy.error_budget import FEWEST, FINEST, _halved, _within, again, narrowed
+from fringetrace.accuracy.error_budget import FEWEST, FINEST, _halved, _within, again, narrowing
 from fringetrace.geometry import forms, shapes
 
 HENE = 632.8 * nm
@@ -161,10 +161,10 @@ def test_light_narrows_towards_a_focus():
     for place, part in ((10 * mm, 0.8), (40 * mm, 0.2)):
         far = 49 * mm
         ccd = ft.CCD((0, 0, far), (0, 0, -1), (0, 1, 0), 0.2 * mm, (64, 64), focus=far - place)
-        found = narrowed(ft.trace(scene, beam, ccd).detected)
+        found = narrowing(ft.trace(scene, beam, ccd).detected)
         np.testing.assert_allclose(found, part, rtol=0.02)
 
 
 def test_a_few_paths_do_not_tell_how_light_narrows(bench):
     few = again(bench.trace(), (2, 2)).detected
-    np.testing.assert_array_equal(narrowed(few), 1.0)
+    np.testing.assert_array_equal(narrowing(few), 1.0)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import arrivals
 import numpy as np
@@ -62,7 +63,7 @@ def test_rays_stand_for_parts_of_a_pixel():
     angle, pixels = 3e-3, 16
     for rays in (16, 32, 48):
         paths = plane(rays, pixels, angle).detected
-        field = ft.complex_field(sampling.spread(paths, HENE), HENE, "rays")
+        field = ft.complex_field(sampling.spread_over_pixels(paths, HENE), HENE, "rays")
         cycles = math.sin(2 * angle) / 16 * mm / HENE
         # rays that lean leave the CCD at one rim
         inner = np.abs(field[:, 2:-2])
@@ -71,26 +72,32 @@ def test_rays_stand_for_parts_of_a_pixel():
 
 @pytest.mark.parametrize("rows", [1, 12, 13, 100])
 def test_bands_lie_in_the_image(rows):
-    ccd = ft.CCD((1, 2, 3), (1, 0, 0), (0, 0, 1), 1.0, (rows, 5), focus=2.0)
-    bands = sampling.bands(ccd)
+    bands = sampling.sample_bands((rows, 5))
     assert len(bands) == (1 if rows <= 12 else 3)
+    assert bands[0][0] >= 0
+    assert bands[-1][1] <= rows
+    assert all(stop - top == min(rows, sampling.ROWS if rows > 12 else rows) for top, stop in bands)
+    assert all(one[1] <= other[0] for one, other in pairwise(bands))
+
+
+def test_parts_of_a_ccd_are_its_bands():
+    ccd = ft.CCD((1, 2, 3), (1, 0, 0), (0, 0, 1), 1.0, (100, 5), focus=2.0)
     _, v, _ = ccd.axes
-    for band in bands:
-        middle = (band.centre - ccd.centre) @ v + 0.5 * rows
-        first = middle - 0.5 * band.shape[0]
-        assert first == pytest.approx(round(first))
-        assert 0 <= first <= rows - band.shape[0]
-        assert band.shape[1] == 5
-        assert band.focus == 2.0
+    for part, (top, stop) in zip(
+        sampling._parts(ccd), sampling.sample_bands(ccd.shape, sampling.MANY), strict=True
+    ):
+        assert part.shape == (stop - top, 5)
+        assert (part.centre - ccd.centre) @ v + 50 == pytest.approx(0.5 * (top + stop))
+        assert part.focus == 2.0
 
 
 def test_fields_on_bands_are_those_of_the_image():
     paths = plane(16, 20, 0.3e-3)
     image = ft.complex_field(paths, HENE, "wavefront")
-    tops = [round(part * 20 - 2) for part in sampling.BANDS]
-    for top, ccd in zip(tops, sampling.bands(paths.ccd), strict=True):
-        field = ft.complex_field(replace(paths, ccd=ccd), HENE, "wavefront")
-        np.testing.assert_allclose(field, image[top : top + 4], rtol=0, atol=1e-9)
+    for field, (top, stop) in zip(
+        sampling._in_bands(paths, HENE), sampling.sample_bands((20, 20)), strict=True
+    ):
+        np.testing.assert_allclose(field[0], image[top:stop], rtol=0, atol=1e-9)
 
 
 def test_grids_that_agree_cost_nothing():

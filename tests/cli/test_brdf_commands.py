@@ -9,14 +9,14 @@ import xarray
 import fringetrace as ft
 from fringetrace.cli import brdf_commands, command
 from fringetrace.core import sweeps
-from fringetrace.scattering.rod_lattice import Lattice
+from fringetrace.scattering.rod_lattice import RodLattice
 
 SHORT = ["--angles", "20 deg", "2", "--wavelengths", "400 nm", "600 nm", "5"]
 
 
 @pytest.fixture
 def rods(tmp_path):
-    ft.meshes.save(Lattice(3, 2).mesh, tmp_path / "rods.ply", "um")
+    ft.meshes.save(RodLattice(3, 2).mesh, tmp_path / "rods.ply", "um")
     return tmp_path / "rods.ply"
 
 
@@ -85,7 +85,7 @@ def test_a_feather_by_rigorous_methods(feathers, tmp_path, capsys, monkeypatch):
         "lattice", "--columns", "3", "--rows", "2", "--pitch", "150 nm", "--arrangement", "square", *SHORT,
     ]  # fmt: skip
     given += ["--rod", "melanin", "--host", "1.55", "--cortex", "100 nm", "--channel", "10 nm"]
-    rods = [*given, "--method", "rods", "--polarisation", "H", "--out", str(tmp_path / "rods")]
+    rods = [*given, "--method", "rods", "--polarisation", "p", "--out", str(tmp_path / "rods")]
     assert command.main(rods) == 0
     assert "not told by this method" in capsys.readouterr().out
     layered = [*given, "--method", "multilayer", "--measured", feathers, "--out", str(tmp_path / "layers")]

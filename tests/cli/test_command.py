@@ -314,7 +314,8 @@ def test_an_error_is_one_clear_line_and_leaves_nothing(case, command, tmp_path, 
 
 
 def test_an_error_is_found_before_anything_is_traced(command, sample, tmp_path, monkeypatch):
-    monkeypatch.setattr("fringetrace.tracing.tracer.trace", lambda *args, **options: pytest.fail("traced"))
+    traced = "fringetrace.instruments.interferometer.trace"
+    monkeypatch.setattr(traced, lambda *args, **options: pytest.fail("traced"))
     (tmp_path / "out").write_text("")
     for options in (["--out", tmp_path / "out"], ["--steps", "2"], ["--wavelength", "0 nm"]):
         assert command("interferogram", sample, "--unit", "mm", *options)[0] == 2
@@ -333,7 +334,7 @@ def test_a_failure_on_the_way_leaves_nothing_half_written(command, sample, tmp_p
     def full(*args):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("fringetrace.validation.measurement.write_netcdf", full)
+    monkeypatch.setattr("fringetrace.validation.measurement.write_measurement", full)
     code, _, errors = command("interferogram", sample, "--unit", "mm", "--out", tmp_path / "out", *QUICK)
     assert code == 2
     assert "No space left on device" in errors
@@ -344,7 +345,7 @@ def test_an_interrupt_ends_it_quietly(command, sample, tmp_path, monkeypatch):
     def interrupted(*args, **options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("fringetrace.tracing.tracer.trace", interrupted)
+    monkeypatch.setattr("fringetrace.instruments.interferometer.trace", interrupted)
     out = tmp_path / "out"
     assert command("interferogram", sample, "--unit", "mm", "--out", out, *QUICK)[::2] == (130, "")
     assert not out.exists()

@@ -7,10 +7,10 @@ import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
+from swept import dies_once, max_of
 
 from fringetrace.core import sweeps
 
@@ -49,10 +49,6 @@ def test_processes_give_the_same():
     assert sweeps.sweep(max_of, [], processes=1) == []
     done = sweeps.sweep(max_of, [{"values": (1.0, 5.0)}, {"values": np.arange(4.0)}], processes=1)
     assert [result["result"].item() for result in done] == [5.0, 3.0]
-
-
-def max_of(values):
-    return np.max(values)
 
 
 def test_what_is_kept_is_not_computed_again(tmp_path, threads):
@@ -145,15 +141,6 @@ def test_a_killed_sweep_goes_on_where_it_stopped(tmp_path):
     for path in (tmp_path / "whole").iterdir():
         with np.load(path) as one, np.load(tmp_path / "killed" / path.name) as other:
             assert one["result"].tobytes() == other["result"].tobytes()
-
-
-def dies_once(x, marks):
-    """Kills its process at 2, the first time."""
-    mark = Path(marks, "died")
-    if x == 2.0 and not mark.exists():
-        mark.touch()
-        os.kill(os.getpid(), signal.SIGKILL)
-    return np.array([x**2, *(int(os.environ.get(name, 0)) for name in sweeps.THREADS)])
 
 
 def test_a_killed_worker_is_told_of_and_the_next_call_goes_on(tmp_path, monkeypatch):

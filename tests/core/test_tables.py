@@ -82,7 +82,7 @@ def test_names_and_units(table):
     assert table.dims == ("x", "y")
     assert table.name == "height"
     assert table.x.attrs["units"] == table.attrs["units"] == "m"
-    both = tables.dataset({"a": ("x", [1.0])}, {"x": ("x", [2.0])}, {"title": "two"})
+    both = tables.labelled_dataset({"a": ("x", [1.0])}, {"x": ("x", [2.0])}, {"title": "two"})
     assert both.a.sel(x=2.0) == 1.0
     assert both.attrs["title"] == "two"
 

@@ -241,7 +241,7 @@ def test_a_polydata_of_float64_keeps_its_digits():
         ),
         (pyvista.ImageData(), TypeError, r"sample: .* got ImageData; .* have a surface, extract_surface\(\)"),
         (trimesh.Scene(), TypeError, r"sample: expected a mesh .* got Scene"),
-        ("part.stl", TypeError, "sample: .* got str; files are read by fringetrace.geometry.meshes.load"),
+        ("part.stl", TypeError, "sample: .* got str; files are read by fringetrace.meshes.load"),
     ],
 )
 def test_what_is_no_mesh_is_refused_by_name(value, error, message):

@@ -61,7 +61,7 @@ def test_weld_joins_zeros_of_either_sign_but_not_neighbouring_numbers():
 @given(st.lists(st.floats(0.2, 3.0), min_size=3, max_size=24), st.booleans())
 def test_a_filled_polygon_has_its_area_and_its_sides(radii, clockwise):
     polygon = star(radii)[:: -1 if clockwise else 1]
-    assume(not triangles.crossing(polygon))  # three or four spokes need not enclose the origin
+    assume(not triangles.self_crossing(polygon))  # three or four spokes need not enclose the origin
     faces = triangles.triangulate(polygon)
     assert (areas(polygon, faces) > 0).all()
     assert areas(polygon, faces).sum() == pytest.approx(abs(shoelace(polygon)), rel=ROUNDING)
@@ -111,7 +111,7 @@ def test_corners_in_a_line_enclose_nothing():
     ],
 )
 def test_sides_that_meet_are_found(polygon, meeting):
-    assert triangles.crossing(np.array(polygon, dtype=float)) == meeting
+    assert triangles.self_crossing(np.array(polygon, dtype=float)) == meeting
 
 
 def oracle(corners, point):

@@ -8,6 +8,7 @@ import pytest
 from fringetrace import instruments, nm
 from fringetrace.core.units import degree
 from fringetrace.core.vectors import unit
+from fringetrace.geometry import shapes
 from fringetrace.instruments.beam_splitters import SplitterPlate, anti_reflecting, semi_reflecting
 from fringetrace.optics import films
 from fringetrace.optics.interfaces import Absorber
@@ -61,7 +62,7 @@ def test_the_axis_of_the_light_hits_the_coating_in_the_origin():
     shift = 2e-3 * math.sin(math.pi / 4 - r) / math.cos(r)
     assert (abs(z), abs(x)) == (pytest.approx(shift, rel=1e-12), pytest.approx(shift, rel=1e-12))
     bench = instruments.michelson(
-        instruments.plate(40e-3, 40e-3), aperture=5e-3, pixels=(3, 3), splitter=SplitterPlate(2e-3, 1.515)
+        shapes.plate(40e-3, 40e-3), aperture=5e-3, pixels=(3, 3), splitter=SplitterPlate(2e-3, 1.515)
     )
     seen = bench.sampled((3, 3), 550 * nm)
     middle = [

@@ -84,7 +84,7 @@ def test_a_surface_keeps_its_interface():
 
 def test_a_sample_may_have_any_name():
     bench = michelson(sample=ft.Surface(plate(8 * mm, 8 * mm), ft.Mirror(), "reference"))
-    assert np.bincount(bench.trace().detected.visits(bench.reference)).tolist() == [48, 48]
+    assert np.bincount(bench.trace().detected.visits(bench.arms.reference.surface)).tolist() == [48, 48]
 
 
 def test_trimesh_is_welcome():

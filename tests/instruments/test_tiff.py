@@ -54,6 +54,8 @@ def test_what_is_refused(tmp_path):
     for images, options, message in (
         (np.zeros(3), {}, r"frames: expected shape .*, got \(3,\)"),
         (np.zeros((1, 1, 1, 2, 2)), {}, r"frames: expected shape .*, got \(1, 1, 1, 2, 2\)"),
+        (np.where(IMAGES < 0.1, np.nan, IMAGES), {}, r"frames: expected finite .* at \d+ of 60 pixels"),
+        (np.array([[1.0, np.inf]]), {"full_scale": 1.0}, r"frames: expected finite .* at 1 of 2 pixels"),
         (IMAGES, {"full_scale": 0.0}, "full scale: expected a positive irradiance, got 0"),
     ):
         with pytest.raises(ValueError, match=message):

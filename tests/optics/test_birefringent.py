@@ -9,7 +9,7 @@ from hypothesis import given, settings, strategies as st
 from meetings import EPS, meeting, power, shower
 
 from fringetrace.core.vectors import unit
-from fringetrace.optics.birefringent import ShearPlate, Wollaston, refracted, savart
+from fringetrace.optics.birefringent import ShearPlate, Wollaston, refract_extraordinary, savart
 
 # Some twenty products and a root, of numbers up to 10 (squares of indices).
 ROUNDING = 200 * EPS
@@ -25,7 +25,7 @@ def inside(rays, axis, n_o, n_e):
     count = len(rays.point)
     rows = np.broadcast_to(np.asarray(axis) / math.hypot(*axis), (count, 3))
     wave = rays.direction * rays.index[:, None]
-    return rows, *refracted(wave, -rays.normal, np.full(count, n_o), np.full(count, n_e), rows)
+    return rows, *refract_extraordinary(wave, -rays.normal, np.full(count, n_o), np.full(count, n_e), rows)
 
 
 @settings(deadline=None, max_examples=30)

@@ -10,7 +10,14 @@ from meetings import EPS, meeting, outcome, power, shower
 
 from fringetrace.core.vectors import rotation
 from fringetrace.optics.birefringent import ShearPlate, Wollaston
-from fringetrace.optics.elements import Annulus, IdealLens, across, bent, carried, lying
+from fringetrace.optics.elements import (
+    Annulus,
+    IdealLens,
+    deflect,
+    rotate_fields,
+    tangential_axis,
+    transverse_axis,
+)
 from fringetrace.optics.gratings import Grating
 from fringetrace.optics.phase_plates import PhasePlate, zone_plate
 from fringetrace.optics.polarisers import Birefringence, JonesPlate, Polariser, Retarder, wave_plate
@@ -173,7 +180,7 @@ def test_the_others_do_without(name):
 def test_carrying_turns_by_the_least_rotation(seed):
     one, other = shower(seed), shower(seed + 1)
     before, after = one.direction, other.direction * np.sign(one.direction[:, 2:] * other.direction[:, 2:])
-    field = carried(one.field, before, after)
+    field = rotate_fields(one.field, before, after)
     for row in range(len(field)):
         axis = np.cross(before[row], after[row])
         angle = np.arctan2(np.linalg.norm(axis), before[row] @ after[row])
@@ -182,18 +189,18 @@ def test_carrying_turns_by_the_least_rotation(seed):
 
 def test_an_axis_along_the_ray_has_no_direction_across():
     slanted = np.array([[0.6, 0.0, 0.8]])
-    assert np.array_equal(across(np.array([0.6, 0.0, 0.8]), slanted), np.zeros((1, 3)))
-    seen = across(np.array([0.0, 0.0, 1.0]), slanted)
+    assert np.array_equal(transverse_axis(np.array([0.6, 0.0, 0.8]), slanted), np.zeros((1, 3)))
+    seen = transverse_axis(np.array([0.0, 0.0, 1.0]), slanted)
     assert seen[0] == pytest.approx([-0.8, 0.0, 0.6], rel=ROUNDING)
     with pytest.raises(ValueError, match="comb: expected a direction along the surface, got its normal"):
-        lying(np.array([0.6, 0.0, 0.8]), slanted, "comb")
+        tangential_axis(np.array([0.6, 0.0, 0.8]), slanted, "comb")
 
 
 def test_a_path_that_is_even_bends_nothing():
     rays = shower(2)
-    direction, possible = bent(rays, np.zeros((12, 3)), False)
+    direction, possible = deflect(rays, np.zeros((12, 3)), False)
     assert np.abs(direction - rays.direction).max() < ROUNDING
-    mirrored, _ = bent(rays, np.zeros((12, 3)), True)
+    mirrored, _ = deflect(rays, np.zeros((12, 3)), True)
     assert np.abs(mirrored - rays.direction * [1.0, 1.0, -1.0]).max() < ROUNDING
     assert possible.all()
 

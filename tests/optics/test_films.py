@@ -89,3 +89,10 @@ def test_outside_of_a_material():
 def test_bad_pairs(pairs):
     with pytest.raises(ValueError, match="quarter-wave stack: expected 0 or more pairs, got"):
         films.quarter_wave_stack(2.3, 1.38, pairs, 550 * nm)
+
+
+@pytest.mark.parametrize("index", [math.nan, math.inf, 0.0, complex(1.0, math.nan)])
+def test_fresnel_refuses_what_is_no_index(index):
+    for first, last in ((index, 1.5), (1.5, np.array([1.0, index]))):
+        with pytest.raises(ValueError, match="fresnel: expected finite indices n"):
+            films.fresnel(first, last, 0.1)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from meetings import EPS, meeting, power, shower
 
-from fringetrace.optics.gratings import Grating, blazed, lamellar, sinusoidal
+from fringetrace.optics.gratings import Grating, blazed_amplitude, lamellar, sinusoidal
 
 ROUNDING = 64 * EPS
 LAMBDA = 633e-9
@@ -74,7 +74,9 @@ def test_phase_gratings_only_share_the_power_out():
     assert sum(abs(a) ** 2 for a in lamellar(wide, math.pi)) == pytest.approx(
         1.0, abs=4.0 / (math.pi**2 * 400)
     )
-    assert sum(abs(blazed(m, 0.4)) ** 2 for m in wide) == pytest.approx(1.0, abs=2.0 / (math.pi**2 * 400))
+    assert sum(abs(blazed_amplitude(m, 0.4)) ** 2 for m in wide) == pytest.approx(
+        1.0, abs=2.0 / (math.pi**2 * 400)
+    )
 
 
 def test_sinusoidal_gratings_by_the_series():
@@ -86,13 +88,13 @@ def test_sinusoidal_gratings_by_the_series():
 
 
 def test_blazed_gratings_at_whole_depths_have_one_order():
-    assert blazed(1, 1.0) == 1.0
-    assert blazed(2, 2.0) == 1.0
-    assert abs(blazed(0, 1.0)) < ROUNDING
+    assert blazed_amplitude(1, 1.0) == 1.0
+    assert blazed_amplitude(2, 2.0) == 1.0
+    assert abs(blazed_amplitude(0, 1.0)) < ROUNDING
     u = (np.arange(4096) + 0.5) / 4096
     for m in (-1, 0, 1, 2):
         mean = np.exp(2j * np.pi * (1.3 - m) * u).mean()
-        assert blazed(m, 1.3) == pytest.approx(mean, abs=1e-5)  # midpoint rule, (2 pi / 4096)^2
+        assert blazed_amplitude(m, 1.3) == pytest.approx(mean, abs=1e-5)  # midpoint rule, (2 pi / 4096)^2
 
 
 def test_orders_share_the_power_equally_unless_told_otherwise():

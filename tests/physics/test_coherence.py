@@ -92,7 +92,7 @@ def test_a_splitter_of_glass_adds_two_crossings_that_a_compensator_takes_away(co
     )
     for wavelength in (633 * nm, 480 * nm):
         seen = bench.trace(wavelength).detected
-        arm = seen.visits(bench.reference)
+        arm = seen.visits(bench.arms.reference.surface)
         n = BK7.index(wavelength).real
         added = 0.0 if compensator else 2 * depth * (math.sqrt(n * n - 0.5) - math.sqrt(0.5))
         longer = seen.length[arm == 0] - seen.length[arm == 1]

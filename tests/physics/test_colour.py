@@ -108,7 +108,7 @@ def test_a_soap_film_under_the_goniometer():
 
 def test_a_black_film_is_black_and_a_thick_one_white():
     assert colour.xyz(film(5 * nm, 1.33, 1.0, W), W)[1] < 1e-3
-    at = colour.samples(2 * 1.33 * 40 * um)
+    at = colour.resolving_wavelengths(2 * 1.33 * 40 * um)
     thick = colour.xyz(film(40 * um, 1.33, 1.0, at), at)
     # fringes within every band of the eye: Airy's mean, 2 R / (1 + R) of one face, has no colour
     face = (0.33 / 2.33) ** 2

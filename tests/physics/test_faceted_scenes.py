@@ -150,7 +150,7 @@ def test_a_lattice_of_rods_is_the_same_from_any_number_of_rays():
 
 def pieces(bench):
     """Cells that edges cut."""
-    found = plane_waves.waves(visibility.survey(bench.trace()))
+    found = plane_waves.plane_waves_of(visibility.survey(bench.trace()))
     return sum((region.kind == 2).sum() for _, region in found)
 
 

@@ -24,7 +24,7 @@ NINE = 0.5e-9
 def arms(bench, wavelength=RED):
     """Rays by the sample, and the path of the reference at each place of the image (untilted: one number)."""
     seen = bench.trace(wavelength).detected
-    visits = seen.visits(bench.reference)
+    visits = seen.visits(bench.arms.reference.surface)
     reference = seen.where(visits == 1).length
     assert np.ptp(reference) / wavelength < WAVES
     return seen.where(visits == 0), float(reference.mean())
@@ -68,7 +68,7 @@ def test_a_tilted_reference_makes_a_carrier_in_the_medium():
         slab, aperture=20 * um, index=CELL, medium=WATER, pixels=(4, 16), reference_tilt=(0.03, -0.02)
     )
     seen = bench.trace(RED).detected
-    reference = seen.where(seen.visits(bench.reference) == 1)
+    reference = seen.where(seen.visits(bench.arms.reference.surface) == 1)
     angle = math.hypot(0.03, 0.02)
     slope = WATER * math.sin(2 * angle) / angle * np.array([0.03, -0.02])
     at = (reference.pixel[:, ::-1] - [8.0, 2.0]) * bench.ccd.pitch

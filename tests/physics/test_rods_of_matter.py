@@ -8,8 +8,8 @@ import pytest
 from rods import FEATHERS, feather, keratin, melanin
 
 from fringetrace import nm
-from fringetrace.rigorous import ray_validity
-from fringetrace.rigorous.cylinder_gratings import spectrum
+from fringetrace.rigorous import validity
+from fringetrace.rigorous.cylinder_gratings import reflectance_spectrum
 from fringetrace.rigorous.cylinders import Cylinders, amplitude, differential_width, scatter
 from fringetrace.rigorous.cylindrical_waves import CONDUCTOR
 
@@ -25,10 +25,10 @@ def test_clear_lattice_in_air_and_keratin():
     wavelength = np.array([420, 450, 480, 500, 520]) * nm
     lattice = feather(150, 150, 100, 90, 0, 8, index=1.75, host=1.55)
     for polarisation, expected in (
-        ("E", [0.07455966, 0.23992057, 0.28111708, 0.09531645, 0.04261329]),
-        ("H", [0.06520142, 0.22631745, 0.22707138, 0.05740897, 0.03670615]),
+        ("s", [0.07455966, 0.23992057, 0.28111708, 0.09531645, 0.04261329]),
+        ("p", [0.06520142, 0.22631745, 0.22707138, 0.05740897, 0.03670615]),
     ):
-        found = spectrum(lattice, wavelength, 0.0, polarisation)
+        found = reflectance_spectrum(lattice, wavelength, 0.0, polarisation)
         np.testing.assert_allclose(found.reflectance, expected, atol=DIGITS)
         np.testing.assert_allclose(found.reflectance + found.transmittance, 1, rtol=1e-12)
 
@@ -54,12 +54,12 @@ def test_feathers(name):
     peak, height, flat_peak, flat_height, *rest = TABLES[name]
     lattice = feather(*FEATHERS[name])
     wavelength = np.array([450, 500, 550, 600, peak - 10, peak, peak + 10]) * nm
-    found = spectrum(lattice, wavelength).reflectance
+    found = reflectance_spectrum(lattice, wavelength).reflectance
     np.testing.assert_allclose(found[:4], rest, rtol=TABLE, atol=6e-6)
     assert found[5] == pytest.approx(height, rel=TABLE, abs=6e-5)
     assert found[5] > max(found[4], found[6])
     near = np.array([flat_peak - 10, flat_peak, flat_peak + 10]) * nm
-    flat = spectrum(lattice, near, method="multilayer").reflectance
+    flat = reflectance_spectrum(lattice, near, method="multilayer").reflectance
     # how thin its layers were is not said
     assert flat[1] == pytest.approx(flat_height, rel=2e-3)
     assert flat[1] > max(flat[0], flat[2])
@@ -68,15 +68,22 @@ def test_feathers(name):
 
 def test_a_blue_green_feather_against_angle():
     lattice, wavelength = feather(*FEATHERS["R2"]), 480 * nm
-    found = [spectrum(lattice, wavelength, math.radians(angle)).reflectance for angle in (0, 20, 40, 60)]
+    found = [
+        reflectance_spectrum(lattice, wavelength, math.radians(angle)).reflectance
+        for angle in (0, 20, 40, 60)
+    ]
     np.testing.assert_allclose(found, [0.232607, 0.307132, 0.170053, 0.033458], rtol=TABLE)
-    assert spectrum(lattice, wavelength, 0.0, "E").reflectance == pytest.approx(0.2004505, abs=1e-7)
-    assert spectrum(lattice, wavelength, 0.0, "H").reflectance == pytest.approx(0.264846, abs=1e-6)
+    assert reflectance_spectrum(lattice, wavelength, 0.0, "s").reflectance == pytest.approx(
+        0.2004505, abs=1e-7
+    )
+    assert reflectance_spectrum(lattice, wavelength, 0.0, "p").reflectance == pytest.approx(
+        0.264846, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(
     ("polarisation", "expected"),
-    [("E", [302.56, 781.58, 1140.59, 1155.01, 891.15]), ("H", [334.12, 815.46, 1145.88, 1129.74, 852.56])],
+    [("s", [302.56, 781.58, 1140.59, 1155.01, 891.15]), ("p", [334.12, 815.46, 1145.88, 1129.74, 852.56])],
 )
 def test_backscatter_of_twenty_by_four_melanin_rods(polarisation, expected):
     centres = [(i * 150 * nm, j * 150 * nm) for i in range(20) for j in range(4)]
@@ -91,7 +98,7 @@ def test_conducting_rods_in_air_reflect_without_a_band():
     centres = [(i * 280 * nm, j * 280 * nm) for i in range(20) for j in range(4)]
     rods = Cylinders(centres, 65 * nm, CONDUCTOR)
     found = [
-        differential_width(scatter(rods, wavelength * nm, IN, "E", orders=5), math.pi / 2)[0, 0] / nm
+        differential_width(scatter(rods, wavelength * nm, IN, "s", orders=5), math.pi / 2)[0, 0] / nm
         for wavelength in (400, 475, 550)
     ]
     assert 54.5e3 < min(found) < max(found) < 73.5e3
@@ -136,7 +143,7 @@ def test_rays_against_the_exact_wave(direction, percent):
             assert abs(exact - (-3.487641 + 9.148322j)) < 1e-6
         error = abs(discs.amplitude(found, 2 * math.pi / wavelength) / exact - 1)
         assert 100 * error == pytest.approx(expected, abs=0.051)
-        assert error < ray_validity(5, wavelength, CONDUCTOR).ray_error
+        assert error < validity(5, wavelength, CONDUCTOR).ray_error
 
 
 @pytest.mark.parametrize("size", [100.0, 1000.0])

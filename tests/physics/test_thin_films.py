@@ -2,7 +2,9 @@
 
 import cmath
 import math
+from itertools import pairwise
 
+import mpmath
 import numpy as np
 import pytest
 import tmm
@@ -11,14 +13,17 @@ from hypothesis import given, settings, strategies as st
 from fringetrace import nm
 from fringetrace.core.units import degree
 from fringetrace.optics import films, materials
-from fringetrace.optics.film_kernels import stack
+from fringetrace.optics.film_kernels import stack_amplitudes
 from fringetrace.optics.films import Film
+from fringetrace.rigorous import effective_medium
 
 EPS = float(np.finfo(np.float64).eps)
 # Reference numbers are printed with nine decimals.
 PRINTED = 0.51e-9
 # Two programs, each with some hundred roundings; a resonance multiplies them.
 RIVAL = 1e-12
+# An amplitude of few layers has some ten roundings; at grazing incidence a power is as good.
+GRAZING = 64 * EPS
 
 SOAP = Film([(1.33, 300 * nm)])
 SOAP_TABLE = [  # wavelength, normal incidence, 45 degrees s, 45 degrees p
@@ -178,8 +183,9 @@ def test_light_sent_back_meets_the_incident_wave():
     film = Film([(2.3, 70 * nm), (1.38, 110 * nm), (1.8, 40 * nm)])
     sine2 = complex(0.6**2)
     n, d = film.indices(550 * nm), film.thickness
-    there = stack(sine2, 1 + 0j, n, d, 1.52 + 0j, 2 * math.pi / (550 * nm))
-    back = stack(sine2, 1.52 + 0j, n[::-1].copy(), d[::-1].copy(), 1 + 0j, 2 * math.pi / (550 * nm))
+    q1, q2 = (cmath.sqrt(n * n - sine2) for n in (1.0, 1.52))
+    there = stack_amplitudes(q1, 1 + 0j, n, d, 1.52 + 0j, 2 * math.pi / (550 * nm))
+    back = stack_amplitudes(q2, 1.52 + 0j, n[::-1].copy(), d[::-1].copy(), 1 + 0j, 2 * math.pi / (550 * nm))
     for part in (0, 1):
         r, t, behind = there[part], there[2 + part], back[part]
         assert abs(r.conjugate() * t + t.conjugate() * behind) < 20 * EPS
@@ -190,7 +196,7 @@ def test_a_layer_at_its_critical_angle():
     film = Film([(1.5, 80 * nm)])
     n, d, k0 = film.indices(550 * nm), film.thickness, 2 * math.pi / (550 * nm)
     at, below, above = (
-        np.array(stack(complex(2.25 * (1 + shift)), 2 + 0j, n, d, 1.8 + 0j, k0))
+        np.array(stack_amplitudes(complex(2.25 * (1 + shift)), 2 + 0j, n, d, 1.8 + 0j, k0))
         for shift in (0.0, -1e-6, 1e-6)
     )
     assert np.isfinite(at).all()
@@ -228,3 +234,68 @@ def test_thousands_of_layers_do_not_overflow():
     got = films.coefficients(films.quarter_wave_stack(4.0, 1.0, 2000, 550 * nm), 1.0, 1.5, 0.0, 550 * nm)
     assert abs(got.rs) == pytest.approx(1.0, rel=1e-12)
     assert got.ts == 0.0
+
+
+def exact_stack(indices, thickness, grazing, wavelength):
+    """R and T of s and of p light from products of interface matrices in 60 digits, grazing angles too."""
+    with mpmath.workdps(60):
+        n = [mpmath.mpc(index) for index in indices]
+        along, up = n[0] * mpmath.cos(grazing), n[0] * mpmath.sin(grazing)
+        kz = [up, *(mpmath.sqrt(m * m - along**2) for m in n[1:])]
+        found = []
+        for p in (False, True):
+            whole = mpmath.eye(2)
+            for j, (a, b) in enumerate(pairwise(range(len(n)))):
+                one, other = (n[b] ** 2 * kz[a], n[a] ** 2 * kz[b]) if p else (kz[a], kz[b])
+                r, t = (one - other) / (one + other), 2 * (n[b] / n[a] * one if p else one) / (one + other)
+                t = 2 * n[a] * n[b] * kz[a] / (one + other) if p else t
+                whole *= mpmath.matrix([[1, r], [r, 1]]) / t
+                if j < len(thickness):
+                    turn = mpmath.exp(2j * mpmath.pi * kz[b] * thickness[j] / mpmath.mpf(wavelength))
+                    whole *= mpmath.matrix([[1 / turn, 0], [0, turn]])
+            flow = [(n[k] * mpmath.conj(kz[k] / n[k])).real if p else kz[k].real for k in (0, -1)]
+            r, t = whole[1, 0] / whole[0, 0], 1 / whole[0, 0]
+            found.append((float(abs(r) ** 2), float(flow[1] / flow[0] * abs(t) ** 2)))
+    return found
+
+
+@pytest.mark.parametrize("grazing", [1.0, 1e-3, 2.0**-20, 2.0**-40])
+@pytest.mark.parametrize(
+    ("indices", "thickness"),
+    [
+        ((1.0, 1.5), ()),
+        ((1.5, 1.0), ()),
+        ((1.0, 2.3, 1.38, 1.0), (60 * nm, 90 * nm)),
+        ((1.0, 0.05 + 3.0j, 1.5), (20 * nm,)),
+        ((1.33, 0.2 + 3.4j), ()),
+    ],
+)
+def test_grazing_incidence_keeps_its_digits(indices, thickness, grazing):
+    # the angle is what its float is: 90 degrees less `grazing`, and what pi/2 is rounded by
+    angle = 0.5 * math.pi - grazing
+    with mpmath.workdps(60):
+        exact = exact_stack(indices, thickness, mpmath.pi / 2 - mpmath.mpf(angle), 500 * nm)
+    film = Film(list(zip(indices[1:-1], thickness, strict=True))) if thickness else None
+    light = film, indices[0], indices[-1], angle, 500 * nm
+    got = zip(films.reflectance(*light), films.transmittance(*light), strict=True)
+    for (reflected, passed), (r, t) in zip(got, exact, strict=True):
+        assert reflected == pytest.approx(r, rel=GRAZING)
+        assert passed == pytest.approx(t, rel=GRAZING)
+
+
+@pytest.mark.parametrize("last", [1.5, 1.0 + 1e-12, 0.7, 0.2 + 3.4j])
+@pytest.mark.parametrize("film", [None, Film([(2.3, 60 * nm), (0.05 + 3.0j, 20 * nm)])])
+def test_at_a_right_angle_all_light_comes_back(last, film):
+    light = film, 1.0, last, 0.5 * math.pi, 500 * nm
+    assert films.transmittance(*light) == (0.0, 0.0)
+    assert films.reflectance(*light) == (1.0, 1.0)
+    stacked = effective_medium.stack_powers([0.0], [1.0], 1.0, last, 500 * nm, 0.5 * math.pi, "p")
+    assert (stacked.reflectance, stacked.transmittance) == (1.0, 0.0)
+
+
+@pytest.mark.parametrize("film", [None, Film([(1.33, 100 * nm), (1.33, 1 * nm)])])
+def test_light_along_a_face_that_is_none_goes_on(film):
+    for angle in (0.0, 1.0, 0.5 * math.pi):
+        light = film, 1.33, 1.33, angle, 500 * nm
+        assert films.transmittance(*light) == pytest.approx((1.0, 1.0), rel=GRAZING)
+        assert films.reflectance(*light) == pytest.approx((0.0, 0.0), abs=GRAZING**2)

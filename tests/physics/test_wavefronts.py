@@ -95,7 +95,7 @@ def test_tilt_fringes_are_averaged_over_the_pixel(tilt, pitch, visibility):
     flat, leaning = (
         arrivals.reflected(beam, ccd, arrivals.plane(angle), key) for key, angle in ((1, 0.0), (2, tilt))
     )
-    image = ft.irradiance(ft.paths.join([flat, leaning]), HENE)
+    image = ft.irradiance(ft.tracing.join([flat, leaning]), HENE)
     x = (np.arange(96) - 47.5) * pitch
     # both paths through the origin of both mirrors: .1 + .05 cos 2a + x sin 2a, against .15
     apart = 0.05 * (math.cos(2 * tilt) - 1) + x * math.sin(2 * tilt)
@@ -273,7 +273,7 @@ def test_the_regions_of_a_lattice_are_as_wide_as_rays_count():
     beam = ft.Beam((0.7 * um, 0, 2 * um), (0.1, 0, -1), (0, 1, 0), (1.2 * um, 0.5 * um), (1, 20_000))
     ccd = ft.CCD((0.7 * um, 0, 1.8 * um), (0, 0, -1), (0, 1, 0), 0.2 * um, (4, 120))
     paths = ft.trace(scene, beam, ccd, max_bounces=4)
-    found = list(plane_waves.waves(survey.survey(paths)))
+    found = list(plane_waves.plane_waves_of(survey.survey(paths)))
     fine = ft.trace(scene, replace(beam, shape=(1, count)), ccd, max_bounces=4).detected
     width = sum(lit_width(region) for _, region in found) / (beam.shape[0] * beam.shape[1])
     assert len(found) > 10

@@ -19,12 +19,12 @@ def law(theta_i, phi_i, theta_o, phi_o):
 
 def anisotropic(theta=THETA, phi_i=PHI[::2], phi_o=PHI):
     grid = np.meshgrid(theta, phi_i, theta, phi_o, indexing="ij")
-    return bsdf_tables.table(law(*grid)[..., None] * RHO, theta, phi_i, theta, phi_o, WAVELENGTHS)
+    return bsdf_tables.brdf_table(law(*grid)[..., None] * RHO, theta, phi_i, theta, phi_o, WAVELENGTHS)
 
 
 def lambertian(rho=RHO):
     values = np.broadcast_to(np.asarray(rho) / np.pi, (3, 1, 3, 2, len(rho)))
-    return bsdf_tables.table(
+    return bsdf_tables.brdf_table(
         values, [0, 0.7, np.pi / 2], [0], [0, 0.7, np.pi / 2], [-np.pi, np.pi], WAVELENGTHS
     )
 
@@ -75,7 +75,7 @@ def test_azimuth_goes_round():
 
 def test_an_isotropic_surface_may_be_turned():
     grid = np.meshgrid(THETA, [0.0], THETA, PHI, indexing="ij")
-    table = bsdf_tables.table(law(*grid)[..., None] * RHO, THETA, [0.0], THETA, PHI, WAVELENGTHS)
+    table = bsdf_tables.brdf_table(law(*grid)[..., None] * RHO, THETA, [0.0], THETA, PHI, WAVELENGTHS)
     wi, wo = directions()
     c, s = np.cos(0.8), np.sin(0.8)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -91,7 +91,7 @@ def test_there_is_no_light_below():
 
 def test_a_lambertian_sphere_is_lamberts():
     light = np.array([0.6, 0.0, 0.8])
-    image = bsdf_tables.sphere(lambertian(), 3 * light, pixels=64)
+    image = bsdf_tables.shaded_sphere(lambertian(), 3 * light, pixels=64)
     side = (np.arange(64) + 0.5) / 32 - 1
     x, y = np.meshgrid(side, side)
     z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))

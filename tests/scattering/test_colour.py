@@ -11,7 +11,7 @@ from fringetrace import FringetraceWarning, nm, um
 from fringetrace.core import tables
 from fringetrace.scattering import colour
 
-W = colour.samples()
+W = colour.resolving_wavelengths()
 # X, Y, Z of fringes without a warning are known this well, where samples are taken as advised.
 SAMPLED = 6e-4
 ROUNDING = 1e-12
@@ -61,7 +61,7 @@ def test_what_aliases_is_warned_of(step):
 
 @given(st.floats(0.0, 60.0))
 def test_the_samples_that_are_advised_are_not_warned_of(path):
-    at = colour.samples(path * um)
+    at = colour.resolving_wavelengths(path * um)
     assert colour.xyz(fringes(path * um, at), at).shape == (3,)
     assert at[[0, -1]] == pytest.approx([360 * nm, 830 * nm], rel=ROUNDING)
     assert np.diff(at).max() <= 5.0000001 * nm
@@ -151,14 +151,14 @@ def test_an_unknown_gamut_or_path_is_refused():
     with pytest.raises(ValueError, match="gamut: expected one of clip, desaturate, linear, got 'cut'"):
         colour.srgb([1, 1, 1], "cut")
     with pytest.raises(ValueError, match="path: expected a length in metres, 0 or more, got -1"):
-        colour.samples(-1)
+        colour.resolving_wavelengths(-1)
 
 
 def test_the_library_leaves_no_traces():
     # colour-science changes how numpy prints when it is imported, and may warn
     code = (
-        "import numpy, warnings; from fringetrace import spectra;"
-        "old = numpy.get_printoptions(), warnings.filters[:]; spectra.white();"
+        "import numpy, warnings; from fringetrace import colour;"
+        "old = numpy.get_printoptions(), warnings.filters[:]; colour.white();"
         "assert old == (numpy.get_printoptions(), warnings.filters[:])"
     )
     run = subprocess.run(

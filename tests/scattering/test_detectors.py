@@ -10,8 +10,8 @@ from fringetrace.scattering.detectors import (
     Cones,
     Pixels,
     checked_angles,
-    everything,
     far_lengths,
+    fraunhofer_paths,
     sides,
     towards,
 )
@@ -102,7 +102,7 @@ def test_a_far_pixel_sees_what_a_pyramid_of_directions_holds():
 
 def test_everything_goes_everywhere():
     paths = scattered(50)
-    both = list(everything(paths, Cones([0.0, 1.0], 0.1), ORIGIN))
+    both = list(fraunhofer_paths(paths, Cones([0.0, 1.0], 0.1), ORIGIN))
     assert [len(rows) for rows, _ in both] == [49, 49]
     assert np.array_equal(both[1][1], far_lengths(paths, both[1][0], ORIGIN, towards(1.0, 0.0)))
 

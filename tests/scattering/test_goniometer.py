@@ -10,7 +10,7 @@ from fringetrace.optics.films import fresnel
 from fringetrace.scattering import goniometer
 from fringetrace.scattering.detectors import Cells, Cones, Pixels
 from fringetrace.scattering.goniometer import amplitudes, brdf, reciprocity
-from fringetrace.scattering.rod_lattice import Lattice
+from fringetrace.scattering.rod_lattice import RodLattice
 
 WAVES = np.array([400, 500, 650]) * nm
 THETA = np.array([-20, 0, 20]) * degree
@@ -19,7 +19,7 @@ POWERS = ("reflected", "transmitted", "missed", "absorbed", "truncated")
 
 @pytest.fixture(scope="module")
 def rods():
-    return Lattice(5, 3, reflectance=0.9).scene
+    return RodLattice(5, 3, reflectance=0.9).scene
 
 
 def mirror():
@@ -205,7 +205,7 @@ def test_a_jones_vector_an_incidence():
 
 def test_a_plane_of_rods_keeps_s_and_p():
     """Along rods s is along every boundary: what light of one number a ray is."""
-    glass = Lattice(3, 2, rod=1.6, host=1.4)
+    glass = RodLattice(3, 2, rod=1.6, host=1.4)
     given = {"rays": (1, 60), "min_amplitude": 1e-2, "max_bounces": 6, **glass.lighting}
     looks = Cones(THETA, 5 * degree)
     scalar, s, p = (
@@ -263,15 +263,15 @@ def test_half_the_rays_tell_what_the_rays_cost(rods):
     truth = brdf(rods, THETA, detector, WAVES, rays=(1, 12000), **given).isel(theta_i=1, phi_i=0)
     for count in (60, 200):
         table = brdf(rods, THETA, detector, WAVES, rays=(1, count), **given)
-        told = goniometer.sampling_error(table, rods, detector, rays=(1, count), **given)
+        told = goniometer.brdf_sampling_error(table, rods, detector, rays=(1, count), **given)
         off = table.isel(theta_i=1, phi_i=0) - truth
         true = float(np.sqrt((off**2).mean() / (truth**2).mean()))
         assert 0.5 * true < told < 10.0 * true
     flat = brdf(mirror(), THETA, Cones(THETA, 0.02), WAVES, rays=(4, 4))
-    assert goniometer.sampling_error(flat, mirror(), Cones(THETA, 0.02), rays=(4, 4)) < 1e-12
+    assert goniometer.brdf_sampling_error(flat, mirror(), Cones(THETA, 0.02), rays=(4, 4)) < 1e-12
     nothing = Cones(THETA + 1.0, 0.02)  # no light goes there
     dark = brdf(mirror(), THETA, nothing, WAVES, rays=(4, 4))
-    assert goniometer.sampling_error(dark, mirror(), nothing, rays=(4, 4)) == 0.0
+    assert goniometer.brdf_sampling_error(dark, mirror(), nothing, rays=(4, 4)) == 0.0
 
 
 def test_rounding_of_what_leaves_is_known_in_waves(rods):

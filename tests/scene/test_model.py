@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import fringetrace as ft
-from fringetrace.scene import model
+from fringetrace.scene import sources
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
 FACES = np.array([[0, 1, 2], [2, 1, 3]])
@@ -82,7 +82,7 @@ def test_ccd():
 
 def test_one_name_may_be_given_without_a_list():
     assert beam(passes="splitter").passes == ("splitter",)
-    assert model.as_names(name for name in ("a", "b")) == ("a", "b")
+    assert sources.as_names(name for name in ("a", "b")) == ("a", "b")
 
 
 @pytest.mark.parametrize(("make", "what", "axis"), [(beam, "Beam", "direction"), (ccd, "CCD", "normal")])

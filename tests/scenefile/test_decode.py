@@ -87,7 +87,7 @@ def test_kinds_are_tables_or_names(read):
         'up = [0, 1, 0], pitch = "1 mm" }',
         ft.elements.Element,
     )
-    assert isinstance(slm.relief, phase_plates.Spline)
+    assert isinstance(slm.relief, phase_plates.SplineRelief)
 
 
 def test_poses_act_in_turn_on_all_that_can_be_moved(read):

@@ -20,10 +20,10 @@ MIRROR = '[[surface]]\nmesh = { type = "plate", width = 1, height = 1 }\ninterfa
 
 @pytest.mark.parametrize("text", EXAMPLES, ids=["bench", "free"])
 def test_the_examples_of_the_page_run(text, tmp_path):
-    setup = files.parsed(text, "my.toml", tmp_path)
-    said = dict(run(setup, tmp_path / "out"))
+    experiment = files.parse_experiment(text, "my.toml", tmp_path)
+    said = dict(run(experiment, tmp_path / "out"))
     written = {file.name for file in (tmp_path / "out").iterdir()}
-    for name in setup.outputs:
+    for name in experiment.outputs:
         stem, _, suffix = name.partition(".")
         assert any(re.fullmatch(rf"{stem}(-\d+(\.\d+)?nm)?\.{suffix}", file) for file in written), name
     assert {"scene", "traced", "power", "budget", "written"} <= set(said)
@@ -34,7 +34,7 @@ def test_the_message_of_the_page_is_the_one_that_is_said(tmp_path):
     shown = re.search(r"^my\.toml:12: .*$", PAGE.read_text(), flags=re.MULTILINE)[0]
     text = "\n" * 9 + MIRROR.replace("interface", "interfce")
     with pytest.raises(ValueError, match=re.escape(shown)):
-        files.parsed(text, "my.toml", tmp_path)
+        files.parse_experiment(text, "my.toml", tmp_path)
 
 
 def written(scene, path):
@@ -72,9 +72,9 @@ def test_a_bench_comes_back_by_its_arguments(tmp_path):
     recipe = files.Recipe(
         "michelson", {"sample": surface, "aperture": mm, "pixels": (3, 4), "profile": ft.Gaussian(mm)}
     )
-    setup = files.Setup((633 * nm,), ("height.nc",), steps=5, bench=recipe)
-    back = written(setup, tmp_path / "it.toml")
-    assert (back.wavelengths, back.outputs, back.steps) == (setup.wavelengths, setup.outputs, 5)
+    experiment = files.Experiment((633 * nm,), ("height.nc",), steps=5, bench=recipe)
+    back = written(experiment, tmp_path / "it.toml")
+    assert (back.wavelengths, back.outputs, back.steps) == (experiment.wavelengths, experiment.outputs, 5)
     one, other = recipe.bench, back.bench.bench
     for mine, its in zip(one.scene.surfaces, other.scene.surfaces, strict=True):
         assert mine.mesh.vertices.tobytes() == its.mesh.vertices.tobytes()
@@ -134,12 +134,12 @@ ERRORS = {
 def test_wholes_that_make_no_sense_are_refused(case, tmp_path):
     text, message = ERRORS[case]
     with pytest.raises(ValueError, match=re.escape(message)):
-        files.parsed(text, "my.toml", tmp_path)
+        files.parse_experiment(text, "my.toml", tmp_path)
 
 
 def test_what_is_no_text_or_no_scene_is_refused(tmp_path):
     (tmp_path / "it.toml").write_bytes(b"\xff\xfe")
     with pytest.raises(ValueError, match=r"it\.toml: expected TOML in UTF-8, got other bytes"):
         files.load(tmp_path / "it.toml")
-    with pytest.raises(TypeError, match="scene file: expected a Setup or a Scene, got dict"):
+    with pytest.raises(TypeError, match="scene file: expected an Experiment or a Scene, got dict"):
         files.save({}, tmp_path / "it.toml")

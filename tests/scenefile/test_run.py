@@ -42,8 +42,8 @@ shape = [6, 4]
 
 
 def recorded(folder, medium='"vacuum"', polarisation=""):
-    setup = files.parsed(LIGHT % (medium, polarisation, polarisation), "it.toml", folder)
-    return setup, list(run.run(setup, folder / "out"))
+    experiment = files.parse_experiment(LIGHT % (medium, polarisation, polarisation), "it.toml", folder)
+    return experiment, list(run.run(experiment, folder / "out"))
 
 
 def dataset(path):
@@ -52,8 +52,8 @@ def dataset(path):
 
 
 def test_the_files_hold_what_python_gives(tmp_path):
-    setup, said = recorded(tmp_path)
-    paths = [trace(setup.scene, beam, setup.ccd) for beam in setup.beam]
+    experiment, said = recorded(tmp_path)
+    paths = [trace(experiment.scene, beam, experiment.ccd) for beam in experiment.beam]
     image = np.stack([ft.irradiance(paths, w) for w in (500 * nm, 600 * nm)])
     light = dataset(tmp_path / "out" / "interferogram.nc")
     np.testing.assert_array_equal(light["interferogram"], image)
@@ -96,10 +96,10 @@ def test_outputs_of_a_bench(tmp_path):
     reference_tilt = ["50 urad", 0]
     sample = { type = "plate", width = "2 mm", height = "2 mm" }
     """
-    setup = files.parsed(text, "it.toml", tmp_path)
-    list(run.run(setup, tmp_path / "out"))
+    experiment = files.parse_experiment(text, "it.toml", tmp_path)
+    list(run.run(experiment, tmp_path / "out"))
     assert tifffile.imread(tmp_path / "out" / "frames.tif").shape == (5, 6, 8)
-    bench = setup.bench.bench
+    bench = experiment.bench.bench
     height = dataset(tmp_path / "out" / "height.nc")["height"][0]
     np.testing.assert_array_equal(height, bench.height(500 * nm, 5))
     for kind in ("dat", "datx"):
@@ -121,7 +121,7 @@ def test_a_picture_is_drawn_or_it_is_said_why_not(tmp_path, monkeypatch, missing
     monkeypatch.setattr(ft.views, "picture", picture)
     asked = '"interferogram.nc", "interferogram.tif", "field.nc", "paths.nc"'
     text = (LIGHT % ('"water"', "", "")).replace(asked, '"scene.png"')
-    said = dict(run.run(files.parsed(text, "it.toml", tmp_path), tmp_path / "out"))
+    said = dict(run.run(files.parse_experiment(text, "it.toml", tmp_path), tmp_path / "out"))
     assert (tmp_path / "out" / "scene.png").exists() == (missing is None)
     assert said.get("no scene.png") == missing
 
@@ -130,7 +130,9 @@ def test_a_scene_without_a_camera_gives_its_paths(tmp_path):
     text = LIGHT[: LIGHT.index("[ccd]")].replace(
         '"interferogram.nc", "interferogram.tif", "field.nc", "paths.nc"', '"paths.nc"'
     )
-    said = dict(run.run(files.parsed(text % ('"air"', "", ""), "it.toml", tmp_path), tmp_path / "out"))
+    said = dict(
+        run.run(files.parse_experiment(text % ('"air"', "", ""), "it.toml", tmp_path), tmp_path / "out")
+    )
     assert "budget" not in said
     assert len(dataset(tmp_path / "out" / "paths.nc")["ray"]) == 2 * 2 * 64
 
@@ -147,5 +149,5 @@ def test_what_cannot_run_is_refused_and_nothing_is_left(tmp_path):
         (text.replace('"500 nm"', '"50 nm"').replace('"vacuum"', '"water"'), "water: expected 182 nm"),
     ):
         with pytest.raises(ValueError, match=message):
-            list(run.run(files.parsed(some, "it.toml", tmp_path), tmp_path / "out"))
+            list(run.run(files.parse_experiment(some, "it.toml", tmp_path), tmp_path / "out"))
         assert not (tmp_path / "out").exists()

@@ -7,22 +7,22 @@ import pytest
 from fringetrace import instruments
 from fringetrace.geometry import forms, mesh, shapes
 from fringetrace.geometry.mesh import Mesh
-from fringetrace.instruments.interferometer import Bench
+from fringetrace.instruments.interferometer import Interferometer
 from fringetrace.optics import films, interfaces, polarisers
 from fringetrace.optics.materials.material import Material
-from fringetrace.scene import model
+from fringetrace.scene import model, sensor, sources
 from fringetrace.scenefile.schema import Recipe, call, concrete, kinds, members, parameters
 
 HINTS = {name: parameter.hint for name, parameter in parameters(model.Surface).items()}
 EVERY = [
     kind
-    for some in ([Mesh], [Bench], [Material], *(members(hint) for hint in HINTS.values()))
+    for some in ([Mesh], [Interferometer], [Material], *(members(hint) for hint in HINTS.values()))
     for kind in kinds(some).values()
 ]
 
 
 def test_units_are_those_of_the_docstrings():
-    assert {name: p.unit for name, p in parameters(model.Beam).items()} == {
+    assert {name: p.unit for name, p in parameters(sources.Beam).items()} == {
         "centre": "m", "direction": "", "up": "", "size": "m", "shape": "", "profile": "m", "passes": "",
         "polarisation": "",
     } | {"profile": ""}  # fmt: skip
@@ -42,10 +42,10 @@ def test_every_parameter_of_every_kind_is_documented_by_name(kind):
 
 
 def test_benches_and_shapes_are_found_by_what_they_return():
-    benches = kinds([Bench])
+    benches = kinds([Interferometer])
     assert benches["michelson"] is instruments.michelson
     public = [getattr(instruments, name) for name in instruments.__all__]
-    made = [f for f in public if inspect.isfunction(f) and f.__annotations__["return"] == "Bench"]
+    made = [f for f in public if inspect.isfunction(f) and f.__annotations__["return"] == "Interferometer"]
     assert list(benches.values()) == made
     assert kinds([Mesh])["rod_lattice"] is shapes.rod_lattice
     assert "load" not in kinds([Mesh]) | kinds([Material])
@@ -56,14 +56,14 @@ def test_kinds_are_those_that_a_parameter_takes():
     found = kinds(members(HINTS["interface"]))
     assert found["Mirror"] is interfaces.Mirror
     assert found["wave_plate"] is polarisers.wave_plate
-    assert not {"Sphere", "Meeting", "Branch", "Formula", "Film"} & set(found)
-    assert "Gaussian" in kinds(members(parameters(model.Beam)["profile"].hint))
+    assert not {"Sphere", "IncidentRays", "Branch", "IndexFormula", "Film"} & set(found)
+    assert "Gaussian" in kinds(members(parameters(sources.Beam)["profile"].hint))
 
 
 def test_alternatives_are_listed_without_none():
     assert members(int | None) == (int,)
     assert members(int | float | None) == (int, float)
-    assert concrete(members(model.CCD | None)) == [model.CCD]
+    assert concrete(members(sensor.CCD | None)) == [sensor.CCD]
 
 
 def test_all_further_arguments_are_a_list():

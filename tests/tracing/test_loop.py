@@ -234,7 +234,7 @@ def test_contradictions_are_counted_and_told():
     # rays start inside of what they take for a vacuum
     inside = ft.trace(ft.Scene([globe()]), ft.Rays([(0, 0, 0)], [(0, 0, 1.0)]))
     assert inside.contradictions.tolist() == [1]
-    text = checks.contradicted(inside)
+    text = checks.media_contradiction(inside)
     assert text == (
         "media contradict: 1 rays came to 'ball', between vacuum and n=1.5 (front and back), in another "
         "medium; close its mesh, turn its normals to the front, name the media of what lies before it, or "
@@ -256,11 +256,11 @@ def test_contradictions_are_counted_and_told():
     # well set
     fine = ft.trace(ft.Scene([globe(1.5), globe(1.8, centre=(0, 0, -1.2), name="other")], medium=1.2), beam())
     assert not fine.contradictions.any()
-    assert checks.contradicted(fine) is None
+    assert checks.media_contradiction(fine) is None
     # of one index, by another name
     named = ft.trace(ft.Scene([globe(1.5, front=1.0)]), beam())
     assert not named.contradictions.any()
-    assert checks.contradicted(ft.trace(ft.Scene([ft.Surface(mesh, ft.Mirror())]), beam())) is None
+    assert checks.media_contradiction(ft.trace(ft.Scene([ft.Surface(mesh, ft.Mirror())]), beam())) is None
 
 
 def test_a_ball_in_a_ball_needs_its_media_named():

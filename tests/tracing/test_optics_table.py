@@ -10,9 +10,11 @@ import pytest
 import fringetrace as ft
 from fringetrace import nm, um
 from fringetrace.geometry import forms, shapes
+from fringetrace.instruments import Arms, Interferometer, Mark
 from fringetrace.optics import materials, polarisers
 from fringetrace.optics.films import Film
-from fringetrace.tracing.optics_table import materials as media_of, needs, optics, plain
+from fringetrace.optics.materials.dispersion import IndexTable
+from fringetrace.tracing.optics_table import needs, optics, plain, scene_media as media_of
 from fringetrace.tracing.rewavelength import at_wavelength
 
 PLATE = shapes.plate(1, 1)
@@ -295,3 +297,56 @@ def test_branches_to_follow():
         match=r"Dielectric follow: expected one of \('both', 'reflected', 'transmitted'\), got 'none'",
     ):
         ft.Dielectric("none")
+
+
+# Glass whose index is that of air, to so much, at 600 nm; and a film that lets all light of 600 nm through.
+NEAR = materials.Material("near air", IndexTable((0.5, 0.6, 0.7), (1.5, 1.0 + 1e-7, 1.5)))
+LIKE = materials.Material("like air", IndexTable((0.5, 0.59, 0.61, 0.7), (1.5, 1.0, 1.0, 1.5)))
+QUARTER = Film([(math.sqrt(1.5), 600 * nm / 4 / math.sqrt(1.5))])
+
+
+@pytest.mark.parametrize(
+    ("scene", "message"),
+    [
+        (lambda: glass.stack([1.0, NEAR, 1.0], [100 * um]), "branches that it cut off have up to 0.2 of"),
+        (lambda: glass.stack([1.0, LIKE, 1.0], [100 * um]), "face 0 sends back no light at all"),
+        (lambda: glass.stack([1.0, 1.5], films=[QUARTER]), "branches that it cut off have up to 0.0"),
+    ],
+)
+def test_branches_that_were_dark_want_a_new_trace(scene, message):
+    """Else a sweep of wavelengths from one trace would lose what is dark at the first one, without a word."""
+    paths = ft.trace(scene(), glass.aimed(0.0), wavelength=600 * nm)
+    with pytest.raises(ValueError, match=f"expected that of the trace, 6e-07 m, since {message}"):
+        at_wavelength(paths, 500 * nm)
+    bright = ft.trace(scene(), glass.aimed(0.0), wavelength=500 * nm)
+    assert len(bright) > len(paths) - (paths.fate == ft.Fate.FAINT).sum()
+    assert at_wavelength(bright, 510 * nm).wavelength == 510 * nm
+
+
+def test_branches_that_drift_want_no_new_trace():
+    """Light to and fro in a slab fades away at any wavelength: what is cut off is as faint there."""
+    paths = ft.trace(slab(), glass.aimed(0.0), wavelength=500 * nm, min_amplitude=1e-6)
+    assert (paths.fate == ft.Fate.FAINT).any()
+    assert at_wavelength(paths, 700 * nm).wavelength == 700 * nm
+
+
+@pytest.mark.parametrize("amplitude", [1e-9, 1.0, 1e6])
+def test_what_is_dark_is_relative_to_the_light(amplitude):
+    ray = ft.Rays([(0, 0, 0.1)], [(0, 0, -1)], amplitude=[amplitude])
+    drifting = ft.trace(slab(), ray, wavelength=500 * nm, min_amplitude=1e-6)
+    assert at_wavelength(drifting, 700 * nm).wavelength == 700 * nm
+    dark = ft.trace(glass.stack([1.0, 1.5], films=[QUARTER]), ray, wavelength=600 * nm)
+    with pytest.raises(ValueError, match="branches that it cut off"):
+        at_wavelength(dark, 500 * nm)
+
+
+def test_an_interferometer_traces_again_where_branches_were_dark():
+    """An etalon swept from the wavelength at which its coating is dark is as bright as traced at each."""
+    plate = glass.stack([1.0, 1.5], films=[QUARTER])
+    beam = ft.Beam((0, 0, 0.01), (0, 0, -1), (0, 1, 0), (1e-3, 1e-3), (8, 8))
+    ccd = ft.CCD((0, 0, 0.02), (0, 0, -1), (0, 1, 0), 1e-4, (8, 8))
+    swept = Interferometer(plate, beam, ccd, Arms(Mark(0)))
+    for wavelength in (600 * nm, 500 * nm, 550 * nm):
+        fresh = Interferometer(plate, beam, ccd, Arms(Mark(0)))
+        np.testing.assert_allclose(swept.fields(wavelength), fresh.fields(wavelength), atol=1e-12)
+    assert swept.traced == (600 * nm, 500 * nm)

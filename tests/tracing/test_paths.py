@@ -132,6 +132,14 @@ def test_the_ledger_says_where_the_power_went():
     assert ledger.error < LEDGER
 
 
+def test_the_ledger_of_many_paths_from_one_ray_loses_no_digits():
+    plates = scene(*[ft.BeamSplitter(0.3**0.5 * 1j, 0.7**0.5)] * 8)
+    ray = ft.Rays([[1e-4, 2e-4, -5e-3]], [[0.01, 0.02, 1.0]])
+    paths = ft.trace(plates, ray, max_bounces=20, min_amplitude=0.0)
+    assert len(paths) > 100_000
+    assert paths.ledger().error < ROUNDING
+
+
 def test_ledgers_of_parts_add_up_to_that_of_the_whole():
     rays = scattered(300, area=0.5, amplitude=np.random.default_rng(2).normal(size=300))
     whole = ft.trace(SPLITTERS, rays, max_bounces=6).ledger()
@@ -263,3 +271,24 @@ def test_rows_are_those_of_the_table(split, what):
 def test_nothing_cannot_be_joined():
     with pytest.raises(ValueError, match="join: expected at least one Paths, got none"):
         join([])
+
+
+def test_join_takes_any_parts_of_one_trace_but_none(split):
+    halves = [split.where(split.ray < 200), split.where(split.ray >= 200)]
+    assert np.array_equal(join(iter(halves)).key, split.key)
+    for nothing in ([], (), iter(())):
+        with pytest.raises(ValueError, match="join: expected at least one Paths, got none"):
+            join(nothing)
+    bare = ft.trace(SPLITTERS, scattered(area=0.5), max_bounces=8)
+    with pytest.raises(ValueError, match="join: expected parts of one trace, got surface in 1 of 2"):
+        join([split, bare])
+
+
+def test_no_rays_are_no_paths():
+    none = ft.Rays(np.empty((0, 3)), np.empty((0, 3)))
+    for record in (False, True):
+        paths = ft.trace(SPLITTERS, none, record=record)
+        assert len(paths) == 0
+        assert vars(paths.ledger()) == dict.fromkeys(vars(paths.ledger()), 0.0)
+        assert paths.ledger().error == 0.0
+        assert len(join([paths, paths])) == 0

@@ -584,3 +584,14 @@ def test_no_kind_of_integer_compiles_the_loops_again():
     before = compiled(3)
     for kind in (np.int32, np.uint8, np.int64):
         assert compiled(kind(3)) == before
+
+
+@pytest.mark.parametrize("record", [False, True])
+@pytest.mark.parametrize("most", [np.uint64(12), np.int8(12), 2**31, 2**63, 2**64, 10**30], ids=repr)
+def test_bounces_may_be_counted_by_any_integer(most, record):
+    plates = [shapes.plate(1.0, 1.0), shapes.plate(1.0, 1.0).moved((0, 0, 0.1))]
+    scene = ft.Scene([ft.Surface(plates[0], ft.BeamSplitter()), ft.Surface(plates[1], ft.Mirror())])
+    ray = ft.Rays([[0.1, 0.2, 0.05]], [[0.0, 0.0, -1.0]])
+    # light is too faint after some eighty bounces
+    plain = ft.trace(scene, ray, max_bounces=12 if most == 12 else 100, record=record)
+    assert np.array_equal(ft.trace(scene, ray, max_bounces=most, record=record).key, plain.key)

@@ -18,7 +18,7 @@ def test_it_finds_the_paths_of_float64_but_for_float32(name):
     # no ray on an edge: there float32 loses some
     beam = standard.lit(14 if name == "corner_cube" else 13)
     ours = ft.trace(standard.scene, beam, standard.ccd).detected
-    theirs = float32_tracer.trace(standard.scene, beam, standard.ccd)
+    theirs = float32_tracer.trace_float32(standard.scene, beam, standard.ccd)
     assert len(theirs) == len(ours) > 60
     for column in ("ray", "bounces"):
         a, b = (np.sort(getattr(paths, column)) for paths in (ours, theirs))
@@ -41,7 +41,7 @@ def test_a_ray_that_misses_all_is_gone():
     scene = ft.Scene([ft.Surface(ft.shapes.plate(1 * mm, 1 * mm), ft.Mirror())])
     beam = ft.Beam((0, 0, 1 * mm), (0, 0, -1), (0, 1, 0), (2 * mm, 2 * mm), (8, 8))
     ccd = ft.CCD((0, 0, 2 * mm), (0, 0, -1), (0, 1, 0), 1 * mm, (4, 4))
-    paths = float32_tracer.trace(scene, beam, ccd)
+    paths = float32_tracer.trace_float32(scene, beam, ccd)
     assert len(paths) == 16
     assert paths.length == pytest.approx(3 * mm, rel=1e-6)
     assert paths.incident == 64
@@ -51,16 +51,16 @@ def test_black_ends_rays_and_bounces_are_counted():
     black = ft.Scene([ft.Surface(ft.shapes.plate(1 * mm, 1 * mm), ft.Absorber())])
     beam = ft.Beam((0, 0, 1 * mm), (0, 0, -1), (0, 1, 0), (0.5 * mm, 0.5 * mm), (4, 4))
     ccd = ft.CCD((0, 0, 2 * mm), (0, 0, -1), (0, 1, 0), 1 * mm, (4, 4))
-    assert len(float32_tracer.trace(black, beam, ccd)) == 0
+    assert len(float32_tracer.trace_float32(black, beam, ccd)) == 0
     mirror = ft.Scene([ft.Surface(ft.shapes.plate(1 * mm, 1 * mm), ft.Mirror())])
-    assert len(float32_tracer.trace(mirror, beam, ccd, max_bounces=0)) == 0
-    assert (float32_tracer.trace(mirror, beam, ccd, max_bounces=1).bounces == 1).all()
+    assert len(float32_tracer.trace_float32(mirror, beam, ccd, max_bounces=0)) == 0
+    assert (float32_tracer.trace_float32(mirror, beam, ccd, max_bounces=1).bounces == 1).all()
 
 
 def test_its_phase_is_wrong_where_ours_is_right():
     standard = STANDARDS["corner_cube"](16, 1)
     ours = ft.trace(standard.scene, standard.lit(14), standard.ccd).detected
-    theirs = float32_tracer.trace(standard.scene, standard.lit(14), standard.ccd)
+    theirs = float32_tracer.trace_float32(standard.scene, standard.lit(14), standard.ccd)
     along, start = standard.beam.direction, standard.beam.centre
     spread = [np.ptp(p.length + (p.origin - start) @ along) / WAVELENGTH for p in (ours, theirs)]
     assert spread[0] < 1e-8

@@ -10,6 +10,7 @@ import xarray
 from matplotlib.image import imread
 
 from fringetrace import instruments, mm, nm
+from fringetrace.core.files import staged
 from fringetrace.geometry.shapes import height_map, plate, step
 from fringetrace.validation import measurement
 
@@ -21,7 +22,7 @@ def measured(mesh, **options):
         mesh, **{"aperture": 6 * mm, "pixels": (30, 40), "reference_tilt": (2e-4, 1e-4), **options}
     )
     truth = measurement.heights(mesh, bench.ccd.shape, bench.ccd.pitch)
-    return measurement.measure(bench, truth, HENE)
+    return measurement.measure_height(bench, truth, HENE)
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_heights_are_those_of_the_mesh_about_a_point():
 
 
 def test_the_netcdf_holds_everything_with_units(bumpy, tmp_path):
-    measurement.write_netcdf(bumpy, tmp_path / "result.nc")
+    measurement.write_measurement(bumpy, tmp_path / "result.nc")
     with xarray.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as data:
         for name, array in (
             ("interferogram", bumpy.interferogram), ("frames", bumpy.frames),
@@ -139,7 +140,7 @@ def test_the_pictures_show_something(bumpy, tmp_path):
 
 def test_staged_files_arrive_together(tmp_path):
     out = tmp_path / "new" / "out"
-    with measurement.staged(out) as folder:
+    with staged(out) as folder:
         (folder / "a").write_text("1")
         (folder / "b").write_text("2")
         assert {path.name for path in out.iterdir()} == {folder.name}
@@ -148,7 +149,7 @@ def test_staged_files_arrive_together(tmp_path):
 
 def test_a_failure_leaves_nothing_behind(tmp_path):
     out = tmp_path / "new" / "out"
-    with pytest.raises(ZeroDivisionError), measurement.staged(out) as folder:  # noqa: PT012
+    with pytest.raises(ZeroDivisionError), staged(out) as folder:  # noqa: PT012
         (folder / "a").write_text("1")
         1 / 0
     assert not list(tmp_path.iterdir())
@@ -156,7 +157,7 @@ def test_a_failure_leaves_nothing_behind(tmp_path):
 
 def test_a_failure_keeps_what_was_there(tmp_path):
     (tmp_path / "a").write_text("before")
-    with pytest.raises(KeyboardInterrupt), measurement.staged(tmp_path) as folder:  # noqa: PT012
+    with pytest.raises(KeyboardInterrupt), staged(tmp_path) as folder:  # noqa: PT012
         (folder / "a").write_text("after")
         raise KeyboardInterrupt
     assert (tmp_path / "a").read_text() == "before"
@@ -165,7 +166,7 @@ def test_a_failure_keeps_what_was_there(tmp_path):
 
 def test_a_folder_that_is_a_file_is_refused(tmp_path):
     (tmp_path / "out").write_text("")
-    with pytest.raises(FileExistsError), measurement.staged(tmp_path / "out"):
+    with pytest.raises(FileExistsError), staged(tmp_path / "out"):
         pass
-    with pytest.raises(NotADirectoryError), measurement.staged(tmp_path / "out" / "deeper"):
+    with pytest.raises(NotADirectoryError), staged(tmp_path / "out" / "deeper"):
         pass

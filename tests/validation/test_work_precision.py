@@ -13,7 +13,7 @@ import fringetrace as ft
 from fringetrace import views
 from fringetrace.validation import work_precision
 from fringetrace.validation.standards import STANDARDS
-from fringetrace.validation.work_precision import METHODS, Run, irradiance_error, phase_error
+from fringetrace.validation.work_precision import METHODS, StandardRun, irradiance_error, phase_error
 
 BY_NAME = {method.name: method for method in METHODS}
 PIXELS, CELLS = 16, 8
@@ -25,7 +25,7 @@ def runs(name, method, counts, cells=CELLS, pixels=PIXELS):
     standard = STANDARDS[name](pixels, cells)
     used = standard if BY_NAME[method].form else standard.faceted()
     truth = standard.truth()
-    return [work_precision.run(used, truth, BY_NAME[method], count) for count in counts]
+    return [work_precision.run_standard(used, truth, BY_NAME[method], count) for count in counts]
 
 
 def test_errors_are_what_they_say():
@@ -90,15 +90,15 @@ def test_the_wavefront_off_forms_is_of_fourth_order(name):
 
 def some(seconds=0.1):
     return [
-        Run("a", "rays, facets", 64, 12, seconds, 1e-2, 1e-1),
-        Run("a", "rays, facets", 256, 12, 4 * seconds, 5e-3, 5e-2),
-        Run("a", "wavefront, form", 64, 12, seconds, 1e-6, 1e-7),
-        Run("b", "rays, facets", 64, 12, seconds, 2e-2, 2e-1),
+        StandardRun("a", "rays, facets", 64, 12, seconds, 1e-2, 1e-1),
+        StandardRun("a", "rays, facets", 256, 12, 4 * seconds, 5e-3, 5e-2),
+        StandardRun("a", "wavefront, form", 64, 12, seconds, 1e-6, 1e-7),
+        StandardRun("b", "rays, facets", 64, 12, seconds, 2e-2, 2e-1),
     ]
 
 
 def test_the_table_has_the_best_run_of_each():
-    lines = work_precision.table(some()).splitlines()
+    lines = work_precision.markdown_table(some()).splitlines()
     assert lines[2:] == [
         "| a | rays, facets | 256 | 0.400 | 5.0e-03 | 5.0e-02 |",
         "| a | wavefront, form | 64 | 0.100 | 1.0e-06 | 1.0e-07 |",
@@ -139,7 +139,7 @@ def test_a_picture_of_nothing_is_refused():
 
 def test_unknown_scenes_are_refused():
     with pytest.raises(ValueError, match=r"scenes: expected some of paraboloid, .* got 'lens'"):
-        work_precision.checked(["step", "lens"])
+        work_precision.checked_standards(["step", "lens"])
 
 
 def test_a_quick_bench_runs_each_method_that_suits():
@@ -190,5 +190,5 @@ def test_results_are_told_apart():
 
 
 def test_hooks_that_are_gone_are_missed():
-    with pytest.raises(LookupError, match="expected nothing_like_that in one of trace"):
-        skips.without(lambda: [], "nothing_like_that", lambda real: real, "trace")()
+    with pytest.raises(LookupError, match=r"nothing_like_that in one of tracing\.tracer"):
+        skips.without(lambda: [], "nothing_like_that", lambda real: real, "tracing.tracer")()

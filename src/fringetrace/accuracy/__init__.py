@@ -1,4 +1,4 @@
-"""Error of an image by cause, and what to warn of."""
+"""Error budget of an image by cause, bounds of single rays, and warnings."""
 
 import lazy_loader
 

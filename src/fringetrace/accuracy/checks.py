@@ -1,4 +1,4 @@
-"""Guards: warnings that name where an image is not to be trusted, by how much, and the way to mend it."""
+"""Warnings about images that cannot be trusted: where, by how much, and the remedy."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray, FringetraceWarning, checked_wavelength
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, pixel_indices
 from fringetrace.tracing import Paths
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ TOUCH, NARROW = 0.1, 0.1
 
 
 def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
-    """What there is to warn of: contradicting media, aliased fringes; starved pixels and folds of ray sums.
+    """Find all problems: contradicting media, aliased fringes; starved pixels and folds of ray sums.
 
     Of the wavefront method, foci and cusps on the CCD.
 
@@ -51,18 +51,18 @@ def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
 
     seen = paths.detected
     if len(seen) == 0:
-        text = contradicted(paths)
+        text = media_contradiction(paths)
         return [] if text is None else [text]
-    texts = [contradicted(paths), aliased(seen, wavelength)]
+    texts = [media_contradiction(paths), aliasing(seen, wavelength)]
     if chosen(paths, method) == "rays":
-        texts += [starved(seen), folded(seen)]
+        texts += [starvation(seen), folding(seen)]
     else:
-        texts.append(focused(seen, wavelength))
+        texts.append(focusing(seen, wavelength))
     return [text for text in texts if text is not None]
 
 
 def check(paths: Paths, wavelength: float, method: str = "auto") -> None:
-    """Warn of what `found` finds.
+    """Warn of the problems that `found` finds.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def check_budget(budget: Budget) -> None:
         warnings.warn(text, FringetraceWarning, stacklevel=3)
 
 
-def judged(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
-    """The error budget of an image, and all that there is to warn of.
+def judge(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
+    """Error budget of an image, and all warnings.
 
     Parameters
     ----------
@@ -108,8 +108,8 @@ def judged(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budge
     return costs, [*found(paths, wavelength, method), *filter(None, [costly(costs)])]
 
 
-def contradicted(paths: Paths) -> str | None:
-    """Whether rays came to a boundary in another medium than it has on that side.
+def media_contradiction(paths: Paths) -> str | None:
+    """Contradicting media: rays reach a boundary in another medium than it has on that side.
 
     Parameters
     ----------
@@ -131,8 +131,8 @@ def contradicted(paths: Paths) -> str | None:
     )
 
 
-def aliased(paths: Paths, wavelength: float) -> str | None:
-    """Whether fringes are too fine for the pixels: the phase between two waves steps by over pi a pixel.
+def aliasing(paths: Paths, wavelength: float) -> str | None:
+    """Aliased fringes: the phase between two waves changes by more than pi per pixel.
 
     Slopes are means over the rays of one path key, in parts of the image that are as small as the
     rays allow.
@@ -150,7 +150,7 @@ def aliased(paths: Paths, wavelength: float) -> str | None:
     ccd = _ccd(paths)
     size = max(1, int(np.ceil(np.sqrt(ENOUGH * ccd.shape[0] * ccd.shape[1] / _rays(paths)))))
     rows, columns = (-(-n // size) for n in ccd.shape)
-    at = np.clip(np.floor(paths.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1) // size
+    at = pixel_indices(ccd, paths.pixel) // size
     part = at[:, 0] * columns + at[:, 1]
     kinds, which = np.unique(paths.key, return_inverse=True)
     if len(kinds) < 2:
@@ -180,8 +180,8 @@ def aliased(paths: Paths, wavelength: float) -> str | None:
     )
 
 
-def starved(paths: Paths) -> str | None:
-    """Whether pixels got no ray though pixels on both sides of them did.
+def starvation(paths: Paths) -> str | None:
+    """Starved pixels: no ray, though pixels on both sides have some.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def starved(paths: Paths) -> str | None:
     """
     ccd = _ccd(paths)
     holes, lit = np.zeros(ccd.shape, dtype=np.bool_), np.zeros(ccd.shape, dtype=np.bool_)
-    row, column = np.clip(np.floor(paths.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1).T
+    row, column = pixel_indices(ccd, paths.pixel).T
     for some in _commonest(paths):
         bright = np.zeros(ccd.shape, dtype=np.bool_)
         bright[row[some], column[some]] = True
@@ -216,8 +216,8 @@ def starved(paths: Paths) -> str | None:
     )
 
 
-def folded(paths: Paths) -> str | None:
-    """Whether a wave folds over the CCD: neighbouring rays arrive in another order than elsewhere.
+def folding(paths: Paths) -> str | None:
+    """Folded wavefronts on the CCD: neighbouring rays arrive in reversed order.
 
     Where facets fold the light only cells across their edges are turned over, one cell wide: that is none.
 
@@ -251,8 +251,8 @@ def folded(paths: Paths) -> str | None:
     )
 
 
-def focused(paths: Paths, wavelength: float) -> str | None:
-    """Whether a wave comes to a point, a line or a cusp on the CCD, where the light of rays is infinite.
+def focusing(paths: Paths, wavelength: float) -> str | None:
+    """Foci and cusps on the CCD, where the irradiance of rays is infinite.
 
     A fold alone is none: the wavefront method knows its uniform form. Looked for in waves off forms.
 
@@ -288,7 +288,7 @@ def focused(paths: Paths, wavelength: float) -> str | None:
 
 
 def costly(budget: Budget) -> str | None:
-    """Whether facets cost more than a twentieth of a wave.
+    """Costly facets: their path error exceeds a twentieth of a wave.
 
     Parameters
     ----------

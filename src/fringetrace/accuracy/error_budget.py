@@ -1,4 +1,4 @@
-"""The error budget: how far an image is off its truth, by cause, in waves."""
+"""Error budget of an image, by cause, in waves."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from fringetrace.core import Array, FloatArray, checked_wavelength
 from fringetrace.scene import Beam
-from fringetrace.tracing import Fate, Paths, at_wavelength, trace
+from fringetrace.tracing import Paths, at_wavelength, retrace
 
 # Rays along the longer side that are followed again, bounce by bounce; prime: not in step with facets.
 PROBES = 53
@@ -32,7 +32,7 @@ CAUSES = {
 
 @dataclass(frozen=True)
 class Budget:
-    """What each cause costs, in waves: an rms over the light on the CCD.
+    """Error budget: rms error in waves by cause, over the light on the CCD.
 
     A field E that is off by e counts as (rms of |e|) / (rms of |E|) / 2 pi waves: the rms error of
     phase, weighted with the irradiance, if phase is what is off.
@@ -65,7 +65,7 @@ class Budget:
 
     @property
     def total(self) -> float:
-        """Root of the sum of squares."""
+        """Total error: root of the sum of squares."""
         return math.hypot(self.hit, self.facets, self.sampling, self.pixels)
 
     def __str__(self) -> str:
@@ -75,12 +75,12 @@ class Budget:
 
     @property
     def line(self) -> str:
-        """The same in one line."""
+        """The budget on one line."""
         return ", ".join(f"{name} {getattr(self, name):.1e}" for name in CAUSES) + " waves rms"
 
 
 def budget(paths: Paths, wavelength: float, method: str = "auto") -> Budget:
-    """What rounding, facets, rays and pixels cost an image; see `Budget`.
+    """Error budget of an image: rounding, facets, ray sampling and pixel quadrature; see `Budget`.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def budget(paths: Paths, wavelength: float, method: str = "auto") -> Budget:
 
 
 def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
-    """The same beam through the same scene, with another grid of rays.
+    """Trace the same beam with another grid of rays.
 
     Parameters
     ----------
@@ -137,12 +137,7 @@ def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:
         Followed for as many bounces as any path of `paths` that reached the CCD, and as faint.
     """
     assert isinstance(paths.source, Beam)
-    bounces = int(paths.bounces[paths.fate == Fate.DETECTED].max(initial=0))
-    beam = replace(paths.source, shape=shape)
-    return trace(
-        paths.scene, beam, paths.ccd, wavelength=paths.wavelength, max_bounces=bounces,
-        min_amplitude=paths.min_amplitude, record=record,
-    )  # fmt: skip
+    return retrace(paths, replace(paths.source, shape=shape), record=record)
 
 
 def _shape(paths: Paths) -> tuple[int, int]:
@@ -174,7 +169,7 @@ def _rms(values: Array, weight: Array) -> float:
 
 
 def hit_error(paths: Paths, wavelength: float) -> float:
-    """Rounding of the optical paths; see `contacts.rounding`.
+    """Rounding error of the optical paths in waves; see `path_errors.rounding`.
 
     Parameters
     ----------
@@ -192,11 +187,11 @@ def hit_error(paths: Paths, wavelength: float) -> float:
 
 
 def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, float] | None]:
-    """What it costs that facets are not the smooth surface behind them.
+    """Facet error: path error of flat facets against the smooth surface behind them, in waves.
 
     A facet that stands off by s makes a path longer by s (n' d' - n d) along its normal: 2 s cos(incidence)
     off a mirror. One that leans by e turns the ray by g e, 2 e off a mirror: after a way of L it lands
-    g e L beside its place, where the true wave, narrowed to a part m of its width, is behind or ahead
+    g e L beside its place, where the true wave, narrowing to a part m of its width, is behind or ahead
     by n' L (g e)^2 / 2 m.
 
     Parameters
@@ -212,16 +207,16 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
     (name, float) or None
         The surface that costs most, and the largest error of a path by it, in waves.
     """
-    from fringetrace.accuracy.path_errors import flattened
+    from fringetrace.accuracy.path_errors import flattening
     from fringetrace.tracing import Segments, leverage, path_change, surface_hits
 
     segments = Segments.of(paths)
     onward = np.cumsum(segments.length.astype(np.float64)[:, ::-1], axis=1)[:, ::-1]
-    narrow = narrowed(paths)
+    narrow = narrowing(paths)
     stood, leant = np.zeros(len(paths)), np.zeros(len(paths))
     worst: dict[str, float] = {}
     for hits in surface_hits(paths):
-        offset, lean = flattened(hits)
+        offset, lean = flattening(hits)
         off = np.asarray(path_change(segments, hits, offset), dtype=np.float64)
         way = np.abs(onward[hits.path, hits.hit + 1]) / narrow[hits.path]
         turned = leverage(segments, hits) ** 2 * (lean**2).sum(axis=1)
@@ -233,8 +228,8 @@ def facet_error(paths: Paths, wavelength: float) -> tuple[float, tuple[str, floa
     return _rms(np.hypot(stood, leant) / wavelength, np.abs(paths.amplitude) ** 2), costliest
 
 
-def narrowed(paths: Paths) -> FloatArray:
-    """Width of the light of each path key on the CCD as a part of its width in the beam.
+def narrowing(paths: Paths) -> FloatArray:
+    """Width of the light of each path key on the CCD, relative to its width in the beam.
 
     Parameters
     ----------

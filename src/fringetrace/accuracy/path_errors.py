@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, unit
-from fringetrace.geometry import dot, standoff
+from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.geometry import standoff
 from fringetrace.scene import Beam
 from fringetrace.tracing import EXTENDED, Fate, Paths, Segments, SurfaceHits, path_change, surface_hits
 
 
-def off(hits: SurfaceHits) -> Array:
-    """Rounding of the hits: how far each stands off its facet, or off the form behind it.
+def hit_offsets(hits: SurfaceHits) -> Array:
+    """Distance of each hit from its facet, or from the exact form behind it.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def off(hits: SurfaceHits) -> Array:
     return np.asarray(height[:, None] * normal)
 
 
-def flattened(hits: SurfaceHits) -> tuple[FloatArray, FloatArray]:
-    """What facets leave out of the smooth surface that they may stand for; see `geometry.standoff`.
+def flattening(hits: SurfaceHits) -> tuple[FloatArray, FloatArray]:
+    """Sag and slope error of facets at hits, against the smooth surface behind; see `geometry.standoff`.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def flattened(hits: SurfaceHits) -> tuple[FloatArray, FloatArray]:
 
 
 def curvature(hits: SurfaceHits) -> FloatArray:
-    """How the normal of the surface turns from place to place: dn = C dp; 0 on facets.
+    """Curvature of the surface at hits: dn = C dp; 0 on facets.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def curvature(hits: SurfaceHits) -> FloatArray:
 
 
 def rounding(paths: Paths) -> FloatArray:
-    """Error of the optical path of each path by the rounding of float64, measured.
+    """Rounding error of the optical path of each path, measured.
 
     The recorded points are compared with the facets and forms that they should lie on, and the
     optical path with the way from point to point, in longer numbers. A path whose points lie on the
@@ -115,7 +115,7 @@ def rounding(paths: Paths) -> FloatArray:
         paths.length.astype(EXTENDED) - segments.advance.sum(axis=1) - (segments.length * index).sum(axis=1)
     )
     for hits in surface_hits(paths):
-        error += path_change(segments, hits, off(hits))
+        error += path_change(segments, hits, hit_offsets(hits))
     assert paths.points is not None
     if isinstance(paths.source, Beam):  # the phase is 0 on its rectangle
         start = paths.points[:, 0].astype(EXTENDED) - paths.source.centre

@@ -1,4 +1,4 @@
-"""How well single rays are known: rounding carried from bounce to bounce, along recorded paths."""
+"""Error bounds of single rays: rounding propagated from bounce to bounce along recorded paths."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CHUNK = 1 << 14
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """How far rounding may have led each path from the ray that was asked for.
+    """Error bounds of single rays: position, direction and optical path.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Bounds:
 
 
 def bounds(paths: Paths) -> Bounds:
-    """Carry the rounding of float64 through the bounces of each path.
+    """Propagate float64 rounding errors through the bounces of each path.
 
     Errors of position, direction and optical path are carried as a covariance by the linear map of
     each segment and bounce: dp' = dp + L dd, onto the surface along the ray; off a mirror

@@ -1,4 +1,4 @@
-"""What the number of rays, and of points in a pixel, costs a field: in waves, without knowing the truth."""
+"""Sampling errors of a field: by the number of rays and by the quadrature in pixels, in waves."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray
-from fringetrace.field import assemble, centred, complex_field
-from fringetrace.scene import CCD, Beam, pixels
+from fringetrace.field import centred, complex_field, reconstruct
+from fringetrace.scene import CCD, Beam, crop, pixels
 from fringetrace.tracing import Paths
 
 # Bands of the image that stand for all of it: their middles, in parts of its height, and pixel rows in each.
@@ -33,25 +33,30 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
     return math.sqrt(off / all_) / (2.0 * math.pi) if all_ > 0.0 else 0.0
 
 
-def bands(ccd: CCD, height: int = ROWS) -> list[CCD]:
-    """Parts of a CCD that stand for all of it: some rows near its lower end, its middle, its upper end.
+def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
+    """Bands of pixel rows that represent all: near the lower end, the middle, the upper end.
 
     Parameters
     ----------
-    ccd : CCD
+    shape : (rows, columns)
     height : int
-        Rows of each.
+        Rows of each band.
 
     Returns
     -------
-    list of CCD
-        The whole, if it has few rows.
+    list of (first row, row after the last)
+        All of them, if there are few.
     """
-    rows, columns = ccd.shape
+    rows = shape[0]
     if rows <= height * len(BANDS):
-        return [ccd]
+        return [(0, rows)]
     tops = [round(min(max(part * rows - 0.5 * height, 0.0), rows - height)) for part in BANDS]
-    return [_cut(ccd, top, height, columns) for top in tops]
+    return [(top, top + height) for top in tops]
+
+
+def _parts(ccd: CCD) -> list[CCD]:
+    """Parts of a CCD that stand for all of it, for the ray sum."""
+    return [crop(ccd, top, stop - top, ccd.shape[1]) for top, stop in sample_bands(ccd.shape, MANY)]
 
 
 def _onto(paths: Paths, ccd: CCD) -> Paths:
@@ -61,17 +66,8 @@ def _onto(paths: Paths, ccd: CCD) -> Paths:
     return replace(paths.where(inside), ccd=ccd)
 
 
-def _cut(ccd: CCD, row: int, rows: int, columns: int, size: int = 1) -> CCD:
-    """Rows of a CCD from one on, and columns from the first on; pixels of size x size of its own as one."""
-    u, v, _ = ccd.axes
-    middle_u = 0.5 * (columns - ccd.shape[1]) * ccd.pitch
-    middle_v = (row + 0.5 * (rows - ccd.shape[0])) * ccd.pitch
-    shape = (rows // size, columns // size)
-    return replace(ccd, centre=ccd.centre + middle_u * u + middle_v * v, pitch=ccd.pitch * size, shape=shape)
-
-
 def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0) -> float:
-    """What the number of rays costs the wavefront method.
+    """Sampling error of the wavefront method, from coarser grids of rays.
 
     The error falls from grid to grid as it is seen to fall, by 16 at most: the method's fourth order.
 
@@ -87,11 +83,7 @@ def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0
     -------
     float, waves; see `budget.Budget`
     """
-    assert grids[0].ccd is not None
-    parts = bands(grids[0].ccd)
-    fields = [
-        [complex_field(replace(paths, ccd=ccd), wavelength, "wavefront") for ccd in parts] for paths in grids
-    ]
+    fields = [_in_bands(paths, wavelength) for paths in grids]
     change = [_difference(fine, coarse) for fine, coarse in pairwise(fields)]
     if change[0] == 0.0:
         return 0.0
@@ -100,7 +92,7 @@ def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0
 
 
 def quadrature_error(paths: Paths, wavelength: float) -> float:
-    """What the points in each pixel cost the wavefront method: some more of them along either axis.
+    """Quadrature error of the wavefront method, from more points along either axis of the pixels.
 
     Parameters
     ----------
@@ -111,21 +103,17 @@ def quadrature_error(paths: Paths, wavelength: float) -> float:
     -------
     float, waves; see `budget.Budget`
     """
-    assert paths.ccd is not None
-    fields: list[ComplexArray] = []
-    finer: list[ComplexArray] = []
-    groups = np.zeros(len(paths), dtype=np.int64)
-    axes = (None,) if paths.field is None else paths.ccd.axes
-    for ccd in bands(paths.ccd):
-        for axis in axes:
-            light = [assemble.light(replace(paths, ccd=ccd), groups, axis=axis)]
-            for images, more in ((fields, 0), (finer, MORE)):
-                images.append(assemble.fields(light, 1, ccd.shape, wavelength, True, more)[0])
-    return _difference(fields, finer)
+    return _difference(_in_bands(paths, wavelength), _in_bands(paths, wavelength, MORE))
 
 
-def spread(paths: Paths, wavelength: float) -> Paths:
-    """Rays that stand for the mean of their plane wave over their part of the pixel that they fall in.
+def _in_bands(paths: Paths, wavelength: float, more: int = 0) -> list[ComplexArray]:
+    """The mean field of pixels that stand for all, by wavefronts; with more points in each."""
+    found = reconstruct(paths, wavelength)
+    return [found.refined(wavelength, rows, more) for rows in sample_bands(found.ccd.shape)]
+
+
+def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
+    """Rays averaged as plane waves over their part of a pixel.
 
     Where there are n x n rays a pixel it has n x n parts. Each ray is continued to the centre of its
     part, see `centred`, and has its amplitude times sinc of the cycles over the part, along either side.
@@ -149,7 +137,7 @@ def spread(paths: Paths, wavelength: float) -> Paths:
 
 
 def offset_error(paths: Paths, wavelength: float) -> float:
-    """What it costs the ray sum that a ray counts where it lands, not by its mean over part of the pixel.
+    """Offset error of the ray sum: rays count where they land, not as means over part of a pixel.
 
     Parameters
     ----------
@@ -162,13 +150,13 @@ def offset_error(paths: Paths, wavelength: float) -> float:
     """
     assert paths.ccd is not None
     seen = paths.detected
-    parts = [_onto(seen, ccd) for ccd in bands(paths.ccd, MANY)]
-    means = [complex_field(spread(part, wavelength), wavelength, "rays") for part in parts]
+    parts = [_onto(seen, ccd) for ccd in _parts(paths.ccd)]
+    means = [complex_field(spread_over_pixels(part, wavelength), wavelength, "rays") for part in parts]
     return _difference(means, [complex_field(part, wavelength, "rays") for part in parts])
 
 
 def count_error(paths: Paths, wavelength: float) -> float:
-    """What it costs the ray sum that pixels get more or fewer rays than their share of light.
+    """Counting error of the ray sum: pixels get more or fewer rays than their share of light.
 
     Every second ray either way, on pixels twice as large, against all of them: there are as many
     rays a pixel, so the smaller sum is off by as much as the image itself.
@@ -186,17 +174,17 @@ def count_error(paths: Paths, wavelength: float) -> float:
     assert paths.ccd is not None
     assert isinstance(paths.source, Beam)
     seen, fields, others = paths.detected, [], []
-    for ccd in bands(paths.ccd, MANY):
+    for ccd in _parts(paths.ccd):
         rows, columns = (n - n % 2 for n in ccd.shape)
         if rows == 0 or columns == 0:
             return 0.0
-        all_ = _onto(seen, _cut(ccd, 0, rows, columns, size=2))
+        all_ = _onto(seen, crop(ccd, 0, rows, columns, binning=2))
         row, column = np.divmod(all_.ray, paths.source.shape[1])
         few = all_.where(_even(row) & _even(column))
         assert few.area is not None
         few = replace(few, area=4.0 * few.area)
-        fields.append(complex_field(spread(all_, wavelength), wavelength, "rays"))
-        others.append(complex_field(spread(few, wavelength), wavelength, "rays"))
+        fields.append(complex_field(spread_over_pixels(all_, wavelength), wavelength, "rays"))
+        others.append(complex_field(spread_over_pixels(few, wavelength), wavelength, "rays"))
     return _difference(fields, others)
 
 

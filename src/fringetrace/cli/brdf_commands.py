@@ -1,4 +1,4 @@
-"""What the command does for structural colour: meshes and lattices in, BRDFs and figures out."""
+"""Commands for structural colour: `brdf` of a mesh, `lattice` for rod lattices."""
 
 from __future__ import annotations
 
@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from xarray import DataArray
 
     from fringetrace.geometry import Mesh
-    from fringetrace.scattering import Detector, Lattice, Polarised
+    from fringetrace.optics import PolarisationName
+    from fringetrace.scattering import Detector, RodLattice
     from fringetrace.scene import Scene
 
 # What there is to say, each under a word.
@@ -47,7 +48,7 @@ def brdf(
     measured: Path | None = None,
     threads: int | None = None,
 ) -> Lines:
-    """BRDF of a mesh of mirrors or of matter, its normal along z: spectra from each angle into each.
+    """BRDF of a mesh of mirrors or matter, its normal along z: spectra between all pairs of angles.
 
     Written to the folder OUT: brdf.nc (labelled, NetCDF), brdf.csv (a row for each pair of angles and
     wavelength), spectra.png; measured.png, if spectra are to be laid over.
@@ -143,11 +144,11 @@ def lattice(
     acceptance: str = "0.64 deg",
     rays: int = 2000,
     method: str = "rays",
-    polarisation: Literal["E", "H", "unpolarised"] | None = None,
+    polarisation: Literal["s", "p", "unpolarised"] | None = None,
     measured: Path | None = None,
     scheduler: str | None = None,
 ) -> Lines:
-    """BRDF of lattices of rods, for every combination of the values given.
+    """BRDF of rod lattices, for every combination of the given values.
 
     What is done is kept in OUT/cells as it comes; the same command goes on where it was stopped.
     Written to the folder OUT: brdf.nc, brdf.csv, spectra.png.
@@ -189,7 +190,7 @@ def lattice(
         reflectance of endless rows, as flat layers of effective index, beside the rigorous one, of one
         lattice: reflectance.csv alone.
     polarisation
-        E or H, the field along the rods, or unpolarised. Default: E; of multilayer: unpolarised.
+        s (the field along the rods), p or unpolarised. Default: s; of multilayer: unpolarised.
     measured
         As in `fringetrace brdf`.
     rays
@@ -212,7 +213,7 @@ def lattice(
         return _endless(base, axes, (theta[theta >= 0.0], waves), polarisation or "unpolarised", over, out)
     options: dict[str, Any] = {
         "rays": rays, "half_angle": parse_angle(acceptance, "--acceptance"), "method": method,
-        "polarisation": polarisation or "E",
+        "polarisation": polarisation or "s",
     }  # fmt: skip
     table = scattering.study(
         base, axes, theta, theta, waves, folder=os.fspath(out / "cells"), scheduler=scheduler, **options
@@ -239,9 +240,9 @@ def _medium(text: str | None) -> Any:
         return text
 
 
-def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, dict[str, Any]]:
+def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[RodLattice, dict[str, Any]]:
     """The first lattice, and the values of what has several."""
-    from fringetrace.scattering import Lattice
+    from fringetrace.scattering import RodLattice
 
     lengths = {"radius", "pitch"}
     values: dict[str, Any] = {
@@ -249,7 +250,7 @@ def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, d
         for name, some in given.items()
     }
     cortex, channel = matter["cortex"], matter["channel"]
-    base = Lattice(
+    base = RodLattice(
         **{name: some[0] for name, some in values.items()}, rod=_medium(matter["rod"]),
         host=_medium(matter["host"]), cortex=0.0 if cortex is None else parse_length(cortex, "--cortex"),
         channel=None if channel is None else parse_length(channel, "--channel"),
@@ -258,8 +259,8 @@ def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[Lattice, d
 
 
 def _endless(
-    base: Lattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray], polarisation: Polarised,
-    over: DataArray | None, out: Path,
+    base: RodLattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray],
+    polarisation: PolarisationName, over: DataArray | None, out: Path,
 ) -> Lines:  # fmt: skip
     """Specular spectra of endless rows, layered and rigorous."""
     from fringetrace import scattering, views
@@ -348,12 +349,12 @@ def _budget(table: DataArray, scene: Scene, detector: Detector, options: dict[st
 
     shortest, theta = float(table.wavelength.min()), float(table.theta_i[len(table.theta_i) // 2])
     hit = scattering.rounding_error(scene, theta, shortest, **options)
-    sampling = scattering.sampling_error(table, scene, detector, **options)
+    sampling = scattering.brdf_sampling_error(table, scene, detector, **options)
     return "budget", f"hit {hit:.1e} waves rms; half the rays change the BRDF by {sampling:.1%} rms"
 
 
 def _first(
-    base: Lattice, table: DataArray, axes: dict[str, Any], theta: FloatArray, options: dict[str, Any]
+    base: RodLattice, table: DataArray, axes: dict[str, Any], theta: FloatArray, options: dict[str, Any]
 ) -> Lines:
     """The budget of the first of some lattices, unless it was found without rays."""
     from fringetrace import scattering
@@ -363,7 +364,7 @@ def _first(
         return []
     given = {
         "method": options["method"], "rays": (1, options["rays"]), "max_bounces": rod_studies.BOUNCES,
-        "min_amplitude": rod_studies.FAINT, "polarisation": rod_studies.ALONG[options["polarisation"]],
+        "min_amplitude": rod_studies.FAINT, "polarisation": rod_studies.TRACED[options["polarisation"]],
         **base.lighting,
     }  # fmt: skip
     one = table.isel(dict.fromkeys(axes, 0))

@@ -1,4 +1,4 @@
-"""The command: a mesh or scene file to interferogram, frames, height map, one labelled file, pictures."""
+"""Command line: mesh or scene file to interferogram, frames, height map, data file and pictures."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fringetrace.geometry import Mesh
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from fringetrace.instruments import Bench
+    from fringetrace.instruments import Interferometer
     from fringetrace.tracing import Paths
     from fringetrace.validation import Measurement
 
@@ -51,7 +51,7 @@ FAILURE, INTERRUPTED = 2, 130
 @Parameter(name="*")
 @dataclass(frozen=True)
 class Settings:
-    """What both commands take.
+    """Options that `interferogram` and `demo` share.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def demo(
     out: Path = Path("fringetrace-demo"),
     settings: Settings = Settings(),
 ) -> None:
-    """The whole way on matplotlib's sample elevation map, scaled down to a few wavelengths.
+    """Demonstrate the whole chain on matplotlib's elevation sample, scaled to a few wavelengths.
 
     Every second sample of the map (Jacksboro fault, Tennessee; 840 m of relief over 30 km) becomes
     a mirror of 8 mm with 2 um of relief, measured and written as by `fringetrace interferogram`.
@@ -155,7 +155,7 @@ def bench(
     quick: bool = False,
     scenes: tuple[str, ...] = (),
 ) -> None:
-    """Run time against error on this machine: methods on scenes whose field is known in closed form.
+    """Benchmark run time against error on this machine, on scenes with closed-form fields.
 
     The ray sum and the wavefront method, with facets and with the exact surface behind them, and a
     tracer in float32 throughout, each with more and more rays: two minutes, or twenty seconds if
@@ -172,12 +172,12 @@ def bench(
     """
     from fringetrace.validation import STANDARDS, work_precision
 
-    names = work_precision.checked(scenes or STANDARDS)
+    names = work_precision.checked_standards(scenes or STANDARDS)
     with staged(out) as folder, _progress("running") as advance:
         done = list(work_precision.runs(names, quick, advance))
         work_precision.write(done, folder)
     console = _console()
-    console.print(work_precision.table(done), markup=False)
+    console.print(work_precision.markdown_table(done), markup=False)
     _say(console, "written", f"{out}: {', '.join(work_precision.FILES)}")
 
 
@@ -204,12 +204,12 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
         method = chosen(bench.trace(), bench.method)
-        costing = aside.submit(checks.judged, bench.trace(), wavelength, method)
-        measured = measurement.measure(bench, truth.result(), wavelength, settings.steps)
+        costing = aside.submit(checks.judge, bench.trace(), wavelength, method)
+        measured = measurement.measure_height(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)
         measurement.write_pictures(measured, folder)
-        measurement.write_netcdf(measured, folder / "result.nc")
+        measurement.write_measurement(measured, folder / "result.nc")
         measurement.write_heights(measured, folder, settings.zygo)
         costs, notes = costing.result()
         _say(console, "budget", f"of the image: {costs.line}")
@@ -224,7 +224,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
 
 def _bench(
     mesh: Mesh, aperture: float | None, wavelength: float, settings: Settings
-) -> tuple[Bench, FloatArray]:
+) -> tuple[Interferometer, FloatArray]:
     """The bench with the sample centred on its axis, and the point (3,) of the sample that is moved to 0."""
     from fringetrace import instruments
 
@@ -256,7 +256,7 @@ def _bench(
     return bench, top
 
 
-def _draw(bench: Bench, paths: Callable[[], Paths], folder: Path) -> str | None:
+def _draw(bench: Interferometer, paths: Callable[[], Paths], folder: Path) -> str | None:
     """scene.png, or why there is none."""
     from fringetrace import views
 
@@ -300,24 +300,24 @@ def _console() -> Console:
     return Console(highlight=False, soft_wrap=True)
 
 
-def _say_bench(console: Console, name: str, mesh: Mesh, bench: Bench, wavelength: float) -> None:
+def _say_bench(console: Console, name: str, mesh: Mesh, bench: Interferometer, wavelength: float) -> None:
     from fringetrace.instruments import path_slope
 
     rows, columns = bench.ccd.shape
     width, height = bench.ccd.size
     moved = "lateral centre moved onto the axis, highest point to z = 0"
     _say(console, "sample", f"{name}: {len(mesh.faces):,} triangles; {moved}")
-    fringes = path_slope(bench.tilt)[0] * width / wavelength
+    fringes = path_slope(bench.arms.tilt)[0] * width / wavelength
     _say(
         console,
         "bench",
         f"Michelson, {_length(wavelength)}, image {_length(width)} x {_length(height)}, "
         f"{columns} x {rows} pixels of {_length(bench.ccd.pitch)}; "
-        f"reference tilted by {bench.tilt[0] * 1e6:.4g} urad: {fringes:.3g} fringes across",
+        f"reference tilted by {bench.arms.tilt[0] * 1e6:.4g} urad: {fringes:.3g} fringes across",
     )
 
 
-def _say_result(console: Console, bench: Bench, measured: Measurement, seconds: float) -> None:
+def _say_result(console: Console, bench: Interferometer, measured: Measurement, seconds: float) -> None:
     paths, power = bench.trace(), measured.ledger
     rays = bench.beam.shape[0] * bench.beam.shape[1]
     _say(
@@ -364,7 +364,7 @@ def _length(metres: float) -> str:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command.
+    """Run the command line.
 
     Parameters
     ----------

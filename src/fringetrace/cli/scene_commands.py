@@ -1,4 +1,4 @@
-"""What the command does for scene files: run, begun, looked at."""
+"""Commands for scene files: `run`, `init` and `view`."""
 
 from __future__ import annotations
 
@@ -6,14 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fringetrace.cli.brdf_commands import Lines
 from fringetrace.core import parse_length
 
 if TYPE_CHECKING:
     from fringetrace.scene import Scene
     from fringetrace.tracing import Paths
-
-# What there is to say, each under a word.
-Lines = list[tuple[str, str]]
 
 
 def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False) -> Iterator[tuple[str, str]]:
@@ -35,13 +33,13 @@ def run(scene: Path, /, *, out: Path | None = None, allow_outside: bool = False)
     from fringetrace import scenefile
     from fringetrace.scenefile import run
 
-    setup = scenefile.load(scene, allow_outside=allow_outside)
+    experiment = scenefile.load(scene, allow_outside=allow_outside)
     folder = Path(f"fringetrace-{scene.stem}") if out is None else out
-    yield from run.run(setup, folder)
+    yield from run.run(experiment, folder)
 
 
 def init(name: str, /) -> Iterator[tuple[str, str]]:
-    """Print a scene file to begin with, as it runs: `fringetrace init michelson > my.toml`.
+    """Print a template of a scene file: `fringetrace init michelson > my.toml`.
 
     Parameters
     ----------
@@ -67,7 +65,7 @@ def view(
     surfaces: str = "interface",
     allow_outside: bool = False,
 ) -> Lines:
-    """Look at a scene file, or at a mesh: in a window, or in files that say what they show.
+    """View a scene file or a mesh in 3D: in a window, or as picture, HTML page or 3D file.
 
     Parameters
     ----------
@@ -127,10 +125,10 @@ def _seen(
         raise ValueError(f"--rays: expected at least 1, got {rays}")
     if path.suffix.lower() != ".toml":
         return Scene((Surface(meshes.load(path, unit=unit), Mirror(), path.stem),)), [], {}
-    setup = scenefile.load(path, allow_outside=allow_outside)
-    if wavelength is None and setup.wavelengths:
-        wavelength = setup.wavelengths[0]
-    scene, paths, image, reference = run.seen(setup, wavelength, rays)
+    experiment = scenefile.load(path, allow_outside=allow_outside)
+    if wavelength is None and experiment.wavelengths:
+        wavelength = experiment.wavelengths[0]
+    scene, paths, image, reference = run.scene_to_draw(experiment, wavelength, rays)
     # as many as were traced are drawn
     looks = {
         "wavelength": wavelength,

@@ -3,7 +3,7 @@ from .compiled import grown as grown, jit as jit, part as part
 from .files import staged as staged, whole as whole
 from .sweeps import grid as grid, sweep as sweep
 from .tables import (
-    Axes as Axes,
+    Coordinates as Coordinates,
     array as array,
     read_csv as read_csv,
     write_csv as write_csv,
@@ -12,10 +12,14 @@ from .units import (
     Array as Array,
     ComplexArray as ComplexArray,
     FloatArray as FloatArray,
+    checked_angles as checked_angles,
     checked_length as checked_length,
+    checked_lengths as checked_lengths,
     checked_wavelength as checked_wavelength,
     checked_wavelengths as checked_wavelengths,
+    checked_whole as checked_whole,
     degree as degree,
+    filled as filled,
     mm as mm,
     nm as nm,
     parse_angle as parse_angle,
@@ -32,6 +36,7 @@ from .vectors import (
     checked_rotation as checked_rotation,
     checked_vector as checked_vector,
     component as component,
+    dot as dot,
     frame as frame,
     rotation as rotation,
     unit as unit,

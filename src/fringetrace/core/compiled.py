@@ -1,4 +1,4 @@
-"""Numba decorators of the compiled loops, and the growth of their tables."""
+"""Numba decorators of the compiled kernels, and growth of their tables."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ part: Any = njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 
 @jit
 def grown(table):
-    """The rows of a full table, and as many blank ones after them."""
+    """Copy of a full table with as many blank rows appended."""
     # an array put into a slice would take numba 7 s, for the text of an error that cannot happen
     larger = np.empty((2 * len(table), table.shape[1]), table.dtype)
     for row in range(len(table)):

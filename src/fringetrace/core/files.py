@@ -12,7 +12,7 @@ from pathlib import Path
 
 @contextmanager
 def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """A place to write a file, which then moves to its path: it is there in full or not at all.
+    """Temporary path for a file that is moved to its target once complete.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def staged(folder: Path) -> Iterator[Path]:
-    """A place to write in; all files move on to `folder` at the end, none of them if something fails.
+    """Temporary folder whose files are moved to `folder` together, or not at all after an error.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The same call over many parameters: on this machine's cores, or on a Dask cluster; kept as they come."""
+"""Parameter sweeps on local cores, an executor or a Dask cluster, with results kept on disk."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ import numpy as np
 from fringetrace.core.units import Array
 
 Cell = Mapping[str, Any]
-Result = dict[str, Array]
+CellResult = dict[str, Array]
 # Where BLAS, OpenMP and numba read how many threads they may have.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 # What a function's one array is called in its file.
@@ -27,7 +27,7 @@ ALONE = "result"
 
 
 def grid(**axes: Sequence[Any]) -> list[dict[str, Any]]:
-    """Every combination of some parameters, the last changing first.
+    """Cartesian product of parameters; the last one varies fastest.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def _named(function: Callable[..., Any]) -> str:
 
 
 def key(function: Callable[..., Any], cell: Cell) -> str:
-    """Name of a cell's file: a digest of the function's name and of the parameters.
+    """File name of a sweep cell: digest of the function's name and its parameters.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def key(function: Callable[..., Any], cell: Cell) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def _arrays(result: Any) -> Result:
+def _arrays(result: Any) -> CellResult:
     """What a function gave, as arrays by name."""
     named = result if isinstance(result, Mapping) else {ALONE: result}
     arrays = {str(name): np.asarray(value) for name, value in named.items()}
@@ -100,7 +100,7 @@ def _arrays(result: Any) -> Result:
     return arrays
 
 
-def _save(arrays: Result, path: Path) -> None:
+def _save(arrays: CellResult, path: Path) -> None:
     """Write beside the place, then move there: a file that is there is whole."""
     beside = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
@@ -113,12 +113,12 @@ def _save(arrays: Result, path: Path) -> None:
         beside.unlink(missing_ok=True)
 
 
-def _load(path: Path) -> Result:
+def _load(path: Path) -> CellResult:
     with np.load(path, allow_pickle=False) as stored:
         return {name: stored[name] for name in stored.files}
 
 
-def _call(function: Callable[..., Any], cell: Cell) -> Result:
+def _call(function: Callable[..., Any], cell: Cell) -> CellResult:
     return _arrays(function(**cell))
 
 
@@ -171,8 +171,8 @@ def sweep(
     scheduler: str | None = None,
     processes: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[Result]:
-    """Call a function with each of many sets of parameters; the results in their order.
+) -> list[CellResult]:
+    """Call a function for each set of parameters, in parallel; results in the order of the parameters.
 
     With a folder each result is kept in a file of its own as soon as it is there, and cells whose file
     is there already are read, not computed: the same sweep goes on where it was stopped, however it
@@ -213,7 +213,7 @@ def sweep(
     """
     names = [key(function, cell) for cell in cells]
     place = None if folder is None else Path(folder)
-    done: dict[str, Result] = {}
+    done: dict[str, CellResult] = {}
     if place is not None:
         place.mkdir(parents=True, exist_ok=True)
         done = {name: _load(place / f"{name}.npz") for name in names if (place / f"{name}.npz").exists()}
@@ -240,8 +240,8 @@ def _said(cell: Cell) -> dict[str, Any]:
 
 
 def _as_they_come(
-    futures: dict[Future[Result], str], cells: Mapping[str, Cell]
-) -> Iterator[tuple[str, Result]]:
+    futures: dict[Future[CellResult], str], cells: Mapping[str, Cell]
+) -> Iterator[tuple[str, CellResult]]:
     """Results with their names; after a failure, what has not begun is given up."""
     try:
         for future in as_completed(list(futures)):

@@ -1,4 +1,4 @@
-"""Labelled tables: arrays whose axes have names and units, in memory, as NetCDF and as CSV."""
+"""Labelled tables: arrays with named axes and units, as xarray, NetCDF and CSV."""
 
 from __future__ import annotations
 
@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     from xarray import DataArray, Dataset
 
 # Axes: name to values and unit.
-Axes = Mapping[str, tuple[Any, str]]
+Coordinates = Mapping[str, tuple[Any, str]]
 # "wavelength / nm", "Wavelength (nm)", "lambda [um]", "wavelength_nm"
 _HEAD = re.compile(r".*?[\s/_(\[]\s*([a-zµμ]+)\s*[)\]]?\s*", re.IGNORECASE)
 
 
-def labelled(values: npt.ArrayLike, axes: Axes, *, name: str, unit: str, **attributes: Any) -> DataArray:
-    """An array whose axes have names and units.
+def labelled(
+    values: npt.ArrayLike, axes: Coordinates, *, name: str, unit: str, **attributes: Any
+) -> DataArray:
+    """Array with named axes, coordinates and units (xarray.DataArray).
 
     Parameters
     ----------
@@ -53,7 +55,7 @@ def array(
     name: str,
     attributes: Mapping[str, Any],
 ) -> DataArray:
-    """An array whose axes have names, and coordinates of any number.
+    """Array with named axes and any number of coordinates (xarray.DataArray).
 
     Parameters
     ----------
@@ -75,10 +77,10 @@ def array(
     return xarray.DataArray(values, dict(coordinates), axes, name=name, attrs=dict(attributes))
 
 
-def dataset(
+def labelled_dataset(
     variables: Mapping[str, Any], coordinates: Mapping[str, Any], attributes: Mapping[str, Any]
 ) -> Dataset:
-    """Several arrays that share axes.
+    """Dataset of several arrays that share axes (xarray.Dataset).
 
     Parameters
     ----------
@@ -96,7 +98,7 @@ def dataset(
 
 
 def write_netcdf(table: DataArray | Dataset, path: str | os.PathLike[str]) -> None:
-    """A table as a NetCDF file, which is there in full or not at all.
+    """Write a table as a NetCDF file, atomically.
 
     Parameters
     ----------
@@ -108,7 +110,7 @@ def write_netcdf(table: DataArray | Dataset, path: str | os.PathLike[str]) -> No
 
 
 def write_rows(table: DataArray, path: str | os.PathLike[str]) -> None:
-    """A table of any number of axes as CSV: a row for each value, after its coordinates, in SI units.
+    """Write a table of any number of axes as CSV: coordinates and value per row, in SI units.
 
     Parameters
     ----------
@@ -125,7 +127,7 @@ def write_rows(table: DataArray, path: str | os.PathLike[str]) -> None:
 
 
 def read_netcdf(path: str | os.PathLike[str]) -> DataArray:
-    """A table from a NetCDF file that holds one.
+    """Read a table from a NetCDF file that holds one.
 
     Parameters
     ----------
@@ -172,7 +174,7 @@ def _numbers(path: str | os.PathLike[str]) -> tuple[list[str], FloatArray]:
 
 
 def read_csv(path: str | os.PathLike[str], unit: str | None = None, percent: bool | None = None) -> DataArray:
-    """Measured spectra from a CSV file: a column of wavelengths, and one for each sample.
+    """Read measured spectra from a CSV file: a wavelength column, and one column per sample.
 
     Parameters
     ----------
@@ -203,7 +205,7 @@ def read_csv(path: str | os.PathLike[str], unit: str | None = None, percent: boo
 
 
 def write_csv(spectra: DataArray, path: str | os.PathLike[str]) -> None:
-    """Spectra as a CSV file that pavo (R) reads: `wl` in nm, then a column of percent for each sample.
+    """Write spectra as CSV for pavo (R): `wl` in nm, then one column of percent per sample.
 
     In R: `as.rspec(read.csv(path))`, which interpolates them to whole nm.
 

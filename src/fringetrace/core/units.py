@@ -1,4 +1,4 @@
-"""Units at the door, and the way from optical path to phase and back."""
+"""Units: lengths and angles parsed from text, wavelength checks, optical path to phase and back."""
 
 from __future__ import annotations
 
@@ -47,8 +47,28 @@ _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*([^\d\
 SHOWN: tuple[tuple[str, float], ...] = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6), ("nm", 1e-9), ("pm", 1e-12))
 
 
+def filled(values: npt.ArrayLike, dtype: npt.DTypeLike = np.float64) -> Array:
+    """Numbers as an array, with NaN for masked values of numpy.ma.
+
+    Parameters
+    ----------
+    values : array-like, any shape
+        `numpy.asarray` alone would take what lies under a mask for a number.
+    dtype : float64 or complex128
+
+    Returns
+    -------
+    of `dtype`, shape of `values`
+        The same array if it is one of that type without a mask.
+    """
+    if type(values) is np.ndarray:
+        return np.asarray(values, dtype=dtype)
+    masked: Any = np.ma.asarray(values, dtype=dtype)
+    return np.asarray(masked.filled(np.nan) if np.ma.is_masked(masked) else masked.data)
+
+
 def unit_of(length: float) -> tuple[str, float]:
-    """The unit in which a length has a few digits before the point.
+    """Unit in which a length has few digits before the decimal point.
 
     Parameters
     ----------
@@ -83,7 +103,7 @@ def _parse(text: str, what: str, units: dict[str, float]) -> float:
 
 
 def checked_length(value: float, what: str) -> float:
-    """The length itself, once it is known to be one.
+    """Checked finite length in metres.
 
     Parameters
     ----------
@@ -105,8 +125,82 @@ def checked_length(value: float, what: str) -> float:
     return float(value)
 
 
+def checked_lengths(values: npt.ArrayLike, what: str) -> FloatArray:
+    """Checked finite lengths in metres, as an array.
+
+    Parameters
+    ----------
+    values : float64, metres, any shape
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    float64, metres, shape of `values`
+
+    Raises
+    ------
+    ValueError
+        If one is not a positive finite number.
+    """
+    lengths = filled(values)
+    wrong = ~((lengths > 0.0) & (lengths < math.inf))
+    if wrong.any():
+        raise ValueError(f"{what}: expected positive lengths in metres, got {lengths[wrong].flat[0]}")
+    return lengths
+
+
+def checked_angles(values: npt.ArrayLike, what: str) -> FloatArray:
+    """Checked finite angles in radians, as an array.
+
+    Parameters
+    ----------
+    values : float64, radians, any shape
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    float64, radians, shape of `values`
+
+    Raises
+    ------
+    ValueError
+        If one is not finite.
+    """
+    angles = filled(values)
+    wrong = ~np.isfinite(angles)
+    if wrong.any():
+        raise ValueError(f"{what}: expected finite angles in radians, got {angles[wrong].flat[0]}")
+    return angles
+
+
+def checked_whole(value: int, least: int, what: str) -> int:
+    """Checked whole number, as a Python int.
+
+    Parameters
+    ----------
+    value : int
+    least : int
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    ValueError
+        If it is no integer, or below `least`.
+    """
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
+        raise ValueError(f"{what}: expected a whole number of at least {least}, got {value!r}")
+    return int(value)
+
+
 def parse_length(text: str, what: str = "length") -> float:
-    """Length in text, in metres.
+    """Length in metres, parsed from text with a unit.
 
     Parameters
     ----------
@@ -128,7 +222,7 @@ def parse_length(text: str, what: str = "length") -> float:
 
 
 def parse_angle(text: str, what: str = "angle") -> float:
-    """Angle in text, in radians; raises like `parse_length`.
+    """Angle in radians, parsed from text with a unit; raises like `parse_length`.
 
     Parameters
     ----------
@@ -145,7 +239,7 @@ def parse_angle(text: str, what: str = "angle") -> float:
 
 
 def unit_length(unit: str | None, what: str = "unit") -> float:
-    """Metres in one of a named unit.
+    """Metres per named length unit.
 
     Parameters
     ----------
@@ -169,7 +263,7 @@ def unit_length(unit: str | None, what: str = "unit") -> float:
 
 
 def checked_wavelength(wavelength: float) -> float:
-    """The wavelength itself, once it is known to be one.
+    """Checked wavelength in metres: finite and positive.
 
     Parameters
     ----------
@@ -208,7 +302,7 @@ def wavenumber(wavelength: float) -> float:
 
 
 def path_phase(length: FloatArray | float, wavelength: float) -> FloatArray:
-    """Phase of an optical path, reduced modulo the wavelength before it is scaled.
+    """Phase of an optical path, reduced modulo the wavelength before scaling.
 
     Parameters
     ----------
@@ -222,13 +316,13 @@ def path_phase(length: FloatArray | float, wavelength: float) -> FloatArray:
         The remainder is exact (IEEE), so a phase costs no digits on long paths.
     """
     period = checked_wavelength(wavelength)
-    fold = np.fmod(np.asarray(length, dtype=np.float64), period)
+    fold = np.fmod(filled(length), period)
     fold = np.where(np.abs(fold) > 0.5 * period, fold - np.copysign(period, fold), fold)
     return np.asarray(2.0 * math.pi * (fold / period), dtype=np.float64)
 
 
 def phase_path(phase: FloatArray | float, wavelength: float) -> FloatArray:
-    """Optical path that belongs to a phase: phase * wavelength / (2 pi).
+    """Optical path of a phase: phase * wavelength / (2 pi).
 
     Parameters
     ----------
@@ -239,12 +333,12 @@ def phase_path(phase: FloatArray | float, wavelength: float) -> FloatArray:
     -------
     float64, metres, shape of `phase`
     """
-    turns = np.asarray(phase, dtype=np.float64) / (2.0 * math.pi)
+    turns = filled(phase) / (2.0 * math.pi)
     return np.asarray(turns * checked_wavelength(wavelength), dtype=np.float64)
 
 
 def checked_wavelengths(wavelengths: npt.ArrayLike) -> FloatArray:
-    """Wavelengths as an array, once they are known to be some.
+    """Checked wavelengths in metres, as an array.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""Vectors of shape (n, 3) in float64, and the frames that rectangles live in."""
+"""Vectors of shape (n, 3) in float64, rotations, and the axes of rectangles."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core.units import FloatArray
+from fringetrace.core.units import Array, FloatArray, filled
 
 # A matrix that changes lengths by more than this part was not meant as a rotation.
 STRETCH = 1e-9
@@ -14,7 +14,7 @@ ROUNDED = 4.0 * float(np.finfo(np.float64).eps)
 
 
 def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
-    """One finite vector.
+    """Checked finite vector of three components.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
         If it is not three numbers, or one is not finite.
     """
     try:
-        vector = np.array(value, dtype=np.float64)
+        vector = filled(value).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what}: expected 3 numbers, got {value!r}") from error
     if vector.shape != (3,):
@@ -43,7 +43,7 @@ def checked_vector(value: npt.ArrayLike, what: str) -> FloatArray:
 
 
 def checked_direction(value: npt.ArrayLike, what: str) -> FloatArray:
-    """One direction, scaled to unit length; a unit vector stays as it is, to the last bit.
+    """Checked direction, scaled to unit length; unit vectors stay the same to the last bit.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def unit(vectors: FloatArray) -> FloatArray:
 
 
 def component(vectors: FloatArray, axis: FloatArray) -> FloatArray:
-    """Components along one axis.
+    """Components of vectors along one axis.
 
     Parameters
     ----------
@@ -103,8 +103,22 @@ def component(vectors: FloatArray, axis: FloatArray) -> FloatArray:
     return np.asarray(np.einsum("ij,j->i", vectors, axis), dtype=np.float64)
 
 
+def dot(a: Array, b: Array) -> Array:
+    """Scalar products of rows, without conjugation.
+
+    Parameters
+    ----------
+    a, b : (n, 3) float64 or complex128
+
+    Returns
+    -------
+    (n,) float64 or complex128
+    """
+    return np.asarray(np.einsum("ij,ij->i", a, b))
+
+
 def frame(normal: npt.ArrayLike, up: npt.ArrayLike, what: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Axes of a rectangle seen along `normal`; (v, u, n) is right-handed.
+    """Axes (u, v) of a rectangle seen along its normal n; (v, u, n) is right-handed.
 
     u = normal x up is to the right of somebody who looks along `normal` with `up` up;
     v is `up` without its part along `normal`.
@@ -139,7 +153,7 @@ def frame(normal: npt.ArrayLike, up: npt.ArrayLike, what: str) -> tuple[FloatArr
 
 
 def checked_rotation(value: npt.ArrayLike, what: str) -> FloatArray:
-    """One rotation matrix.
+    """Checked rotation matrix.
 
     Parameters
     ----------
@@ -156,7 +170,7 @@ def checked_rotation(value: npt.ArrayLike, what: str) -> FloatArray:
     ValueError
         If the shape is wrong, or the matrix would change lengths or swap left and right.
     """
-    matrix = np.asarray(value, dtype=np.float64)
+    matrix = filled(value)
     if matrix.shape != (3, 3):
         raise ValueError(f"{what}: expected a rotation matrix of shape (3, 3), got shape {matrix.shape}")
     stretch = np.abs(matrix @ matrix.T - np.eye(3)).max()
@@ -166,7 +180,7 @@ def checked_rotation(value: npt.ArrayLike, what: str) -> FloatArray:
 
 
 def rotation(axis: npt.ArrayLike, angle: float) -> FloatArray:
-    """Matrix of a right-handed turn (Rodrigues).
+    """Rotation matrix about an axis, right-handed (Rodrigues).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The warning class of the package."""
+"""Warning class of the package."""
 
 from __future__ import annotations
 
@@ -9,4 +9,4 @@ if TYPE_CHECKING:
 
 
 class FringetraceWarning(UserWarning):
-    """An image is not to be trusted: where, by how much, and what to do."""
+    """Warning that an image cannot be trusted: where, by how much, and the remedy."""

@@ -1,4 +1,4 @@
-"""Traced paths to complex field, irradiance and mutual intensity on a plane."""
+"""Complex field, irradiance and mutual intensity on a plane, from traced paths."""
 
 import lazy_loader
 

@@ -1,23 +1,43 @@
-"""From arrivals to light on the pixels: complex fields, irradiance, mutual intensity."""
+"""Coherent sum on the pixels: complex field, irradiance and mutual intensity of traced paths."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import chain, groupby
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import ComplexArray, FloatArray, checked_wavelength
-from fringetrace.scene import Beam, screen
-from fringetrace.tracing import Paths, along, at_wavelength, join
+from fringetrace.field.ray_sum import RaySum
+from fringetrace.scene import Beam, Spectrum
+from fringetrace.tracing import Paths, at_wavelength, join, needs
+
+
+class PixelLight(Protocol):
+    """Protocol of light on the pixels of a CCD, by wavefronts or by a ray sum."""
+
+    def complex_field(
+        self, wavelength: float, groups: npt.ArrayLike | None = None, half_wave_loss: bool = True
+    ) -> ComplexArray:
+        """Complex field, averaged over each pixel; see `complex_field`."""
+
+    def irradiance(self, light: float | Spectrum, half_wave_loss: bool = True) -> FloatArray:
+        """Irradiance, averaged over each pixel; see `irradiance`."""
+
+    def mutual_intensity(
+        self, light: float | Spectrum, groups: npt.ArrayLike, half_wave_loss: bool = True
+    ) -> ComplexArray:
+        """Mutual intensity, averaged over each pixel; see `mutual_intensity`."""
+
 
 # A wavefront is worth its while where so many rays of the beam share a facet, or facets are so few.
 SHARING, FEW = 16, 64
 
 
 def method_for(paths: Paths) -> str:
-    """The method that "auto" stands for.
+    """Method that "auto" stands for: wavefront or ray sum.
 
     "wavefront" for a `Beam` whose rays are at least `SHARING` times as many as the flat facets of the
     scene (coplanar triangles are one; surfaces with a form have none), or where those are `FEW`;
@@ -31,14 +51,14 @@ def method_for(paths: Paths) -> str:
     -------
     {"wavefront", "rays"}
     """
-    from fringetrace.scene import parted
+    from fringetrace.scene import group_facets
 
     if not isinstance(paths.source, Beam) or paths.ccd is None or torn(paths):
         return "rays"
     most = max(FEW, int(np.prod(paths.source.shape)) // SHARING)
     flat = [surface for surface in paths.scene.surfaces if surface.form is None]
     if sum(len(surface.mesh.faces) for surface in flat) > most:
-        parts = parted(paths.scene)
+        parts = group_facets(paths.scene)
         facets = [parts[i].max() + 1 for i, s in enumerate(paths.scene.surfaces) if s.form is None]
         if sum(facets) > most:
             return "rays"
@@ -46,7 +66,7 @@ def method_for(paths: Paths) -> str:
 
 
 def torn(paths: Paths) -> str | None:
-    """Name of a surface that tears waves: an element behind which neighbouring rays may fare differently.
+    """Name of a surface that tears wavefronts: an element that treats neighbouring rays differently.
 
     Parameters
     ----------
@@ -67,7 +87,7 @@ def complex_field(
     half_wave_loss: bool = True,
     groups: npt.ArrayLike | None = None,
 ) -> ComplexArray:
-    """Complex field on the pixels of the CCD.
+    """Complex field, averaged over each pixel of the CCD.
 
     Parameters
     ----------
@@ -100,37 +120,26 @@ def complex_field(
         paths without a CCD, or no paths at all;
         with "wavefront", for paths that are not of a beam; for groups that do not fit the paths.
     """
-    wavelength = checked_wavelength(wavelength)
-    method, parts = _method(paths, method, wavelength)
-    if method == "wavefront":
-        mean = _wavefront(parts, wavelength, groups, True, half_wave_loss)[0]
-        return mean if groups is not None else np.ascontiguousarray(mean[0])
-    if groups is None:
-        return _sum(parts, wavelength, half_wave_loss)
-    parts = list(parts)
-    numbers = _numbers(parts, groups)
-    count = max(int(number.max(initial=0)) for number in numbers) + 1
-    member = [
-        [part.where(number == g) for part, number in zip(parts, numbers, strict=True)] for g in range(count)
-    ]
-    return np.stack([_sum(group, wavelength, half_wave_loss) for group in member])
+    return light_on(paths, wavelength, method).complex_field(wavelength, groups, half_wave_loss)
 
 
 def mutual_intensity(
     paths: Paths | Iterable[Paths],
-    wavelength: float,
+    light: float | Spectrum,
     groups: npt.ArrayLike,
     method: str = "auto",
     half_wave_loss: bool = True,
 ) -> ComplexArray:
-    """Mean over each pixel of E_m conj(E_n), for the fields of groups of paths.
+    """Mutual intensity E_m conj(E_n) of groups of paths, averaged over each pixel.
 
     What a camera sees of groups whose phases are stepped by d_m is the sum of J_mn exp(i (d_m - d_n)).
 
     Parameters
     ----------
-    paths, wavelength, method, half_wave_loss
+    paths, method, half_wave_loss
         As in `complex_field`.
+    light : float or Spectrum
+        A wavelength in metres, or several, whose mutual intensities add.
     groups : (paths,) int
         The group of each path, from 0 on; with "wavefront", paths of one key are of one group.
 
@@ -144,43 +153,30 @@ def mutual_intensity(
     ValueError
         As in `complex_field`.
     """
-    wavelength = checked_wavelength(wavelength)
-    method, parts = _method(paths, method, wavelength)
-    if method == "wavefront":
-        return _wavefront(parts, wavelength, groups, False, half_wave_loss)[1]
-    return products(complex_field(parts, wavelength, method, half_wave_loss, groups))
-
-
-def products(fields: ComplexArray) -> ComplexArray:
-    """E_m conj(E_n) of fields, summed over the components of light with a polarisation.
-
-    Parameters
-    ----------
-    fields : (groups, rows, columns) complex128, or (groups, 3, rows, columns)
-
-    Returns
-    -------
-    (groups, groups, rows, columns) complex128
-    """
-    from fringetrace.field.pixel_quadrature import mutual_products
-
-    if fields.ndim == 3:
-        return mutual_products(fields)
-    return np.asarray(sum(mutual_products(fields[:, k]) for k in range(3)), dtype=np.complex128)
+    found = [
+        share * one.mutual_intensity(part, groups, half_wave_loss)
+        for share, part, one in _lights(paths, light, method)
+    ]
+    return np.asarray(np.sum(found, axis=0) if len(found) > 1 else found[0], dtype=np.complex128)
 
 
 def irradiance(
-    paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto", half_wave_loss: bool = True
+    paths: Paths | Iterable[Paths],
+    light: float | Spectrum,
+    method: str = "auto",
+    half_wave_loss: bool = True,
 ) -> FloatArray:
-    """Irradiance averaged over each pixel of the CCD.
+    """Irradiance |E|^2, averaged over each pixel of the CCD.
 
     Overlapping sheets add before the square is taken, at as many points of each pixel as their
     fringes ask for: the mean of |E|^2, not the square of the mean field.
 
     Parameters
     ----------
-    paths, wavelength, method, half_wave_loss
+    paths, method, half_wave_loss
         As in `complex_field`. The irradiances of beams that are not coherent with each other add.
+    light : float or Spectrum
+        A wavelength in metres, or several, whose irradiances add.
 
     Returns
     -------
@@ -192,17 +188,14 @@ def irradiance(
     ValueError
         As in `complex_field`.
     """
-    wavelength = checked_wavelength(wavelength)
-    method, parts = _method(paths, method, wavelength)
-    if method == "wavefront":
-        mutual = _wavefront(parts, wavelength, None, False, half_wave_loss)[1]
-        return np.ascontiguousarray(mutual[0, 0].real)
-    squares = np.abs(_sum(parts, wavelength, half_wave_loss)) ** 2
-    return np.asarray(squares if squares.ndim == 2 else squares.sum(axis=0), dtype=np.float64)
+    found = [
+        share * one.irradiance(part, half_wave_loss) for share, part, one in _lights(paths, light, method)
+    ]
+    return np.asarray(np.sum(found, axis=0) if len(found) > 1 else found[0], dtype=np.float64)
 
 
 def chosen(paths: Paths, method: str) -> str:
-    """A method, "auto" resolved.
+    """Method of the coherent sum, with "auto" resolved.
 
     Parameters
     ----------
@@ -226,89 +219,57 @@ def chosen(paths: Paths, method: str) -> str:
     return method_for(paths) if method == "auto" else method
 
 
-def _method(paths: Paths | Iterable[Paths], method: str, wavelength: float) -> tuple[str, Iterable[Paths]]:
-    """The method, "auto" resolved, and the paths at a wavelength in parts, of which there is at least one."""
+def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto") -> PixelLight:
+    """Light of paths on their CCD by a chosen method, to be evaluated at a wavelength.
+
+    Parameters
+    ----------
+    paths, wavelength, method
+        As in `complex_field`.
+
+    Returns
+    -------
+    PixelLight
+        `Wavefronts`, which are kept with the paths, or a `RaySum`.
+
+    Raises
+    ------
+    ValueError
+        As in `complex_field`.
+    """
+    wavelength = checked_wavelength(wavelength)
+    first, parts = _first(paths)
+    if chosen(first, method) == "rays":
+        return RaySum(at_wavelength(part, wavelength) for part in parts)
+    from fringetrace.field.wavefront.wavefronts import reconstruct
+
+    # chunks of a stream are parts of one beam
+    beams = [list(some) for _, some in groupby(parts, lambda part: id(part.source))]
+    return reconstruct([join(some) for some in beams], wavelength)
+
+
+def _lights(
+    paths: Paths | Iterable[Paths], light: float | Spectrum, method: str
+) -> Iterator[tuple[float, float | Spectrum, PixelLight]]:
+    """Parts of some light that are evaluated together: a factor, the part, and what brings it to the CCD."""
+    if not isinstance(light, Spectrum):
+        yield 1.0, light, light_on(paths, light, method)
+        return
+    parts = [paths] if isinstance(paths, Paths) else list(paths)
+    first, _ = _first(parts)
+    if needs(first.scene) is None and chosen(first, method) == "wavefront":
+        yield 1.0, light, light_on(parts, float(light.wavelengths[0]), method)
+        return
+    for wavelength, share in zip(light.wavelengths.tolist(), light.weights.tolist(), strict=True):
+        yield share, wavelength, light_on(parts, wavelength, method)
+
+
+def _first(paths: Paths | Iterable[Paths]) -> tuple[Paths, Iterator[Paths]]:
+    """The first of the paths, of which there is at least one, onto a CCD; and all of them."""
     rest = iter((paths,) if isinstance(paths, Paths) else paths)
     first = next(rest, None)
     if first is None:
         raise ValueError("field: expected at least one Paths, got none")
     if first.ccd is None:
         raise ValueError("field: expected paths traced onto a CCD, got paths without one")
-    return chosen(first, method), (at_wavelength(part, wavelength) for part in chain([first], rest))
-
-
-def _numbers(parts: list[Paths], groups: npt.ArrayLike) -> list[npt.NDArray[np.int64]]:
-    """The group of each path of each part."""
-    number, ends = np.asarray(groups), np.cumsum([len(part) for part in parts])
-    whole = np.issubdtype(number.dtype, np.integer)
-    if number.shape != (ends[-1],) or not whole or (number < 0).any():
-        raise ValueError(
-            f"groups: expected {ends[-1]} whole numbers from 0 on, one a path, got {number.dtype} "
-            f"of shape {number.shape}"
-        )
-    return np.split(number.astype(np.int64), ends[:-1])
-
-
-def _axes(paths: Paths) -> tuple[FloatArray, ...] | tuple[None]:
-    """The CCD's columns, rows and normal, where light has a polarisation."""
-    assert paths.ccd is not None
-    return (None,) if paths.field is None else paths.ccd.axes
-
-
-def _sum(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> ComplexArray:
-    """The coherent sum over rays."""
-    from fringetrace.field.ray_sum_kernels import gather
-
-    total = np.empty((0, 0, 0), dtype=np.complex128)
-    for part in parts:
-        assert part.ccd is not None
-        axes = _axes(part)
-        if total.size == 0:
-            total = np.zeros((len(axes), *part.ccd.shape), dtype=np.complex128)
-        weight = 1.0 if part.area is None else part.area / part.ccd.pitch**2
-        for image, axis in zip(total, axes, strict=True):
-            amplitude = part.amplitude if axis is None else along(part, axis).amplitude
-            gather(
-                part.fate, part.origin, part.length, amplitude, part.reflections, half_wave_loss,
-                screen(part.ccd), part.ccd.pitch, weight, wavelength, image,
-            )  # fmt: skip
-    return total if len(total) == 3 else total[0]
-
-
-def _wavefront(
-    parts: Iterable[Paths],
-    wavelength: float,
-    groups: npt.ArrayLike | None,
-    carrier: bool,
-    half_wave_loss: bool,
-) -> tuple[ComplexArray, ComplexArray]:
-    """Mean fields of groups, and means of their products, of all beams together."""
-    parts = list(parts)
-    if groups is None:
-        groups = np.zeros(sum(len(part) for part in parts), dtype=np.int64)
-    numbers = _numbers(parts, groups)
-    seen = [_component(parts, numbers, axis, wavelength, carrier, half_wave_loss) for axis in _axes(parts[0])]
-    if len(seen) == 1:
-        return seen[0]
-    return np.stack([mean for mean, _ in seen], axis=1), np.sum([mutual for _, mutual in seen], axis=0)
-
-
-def _component(
-    parts: list[Paths],
-    numbers: list[npt.NDArray[np.int64]],
-    axis: FloatArray | None,
-    wavelength: float,
-    carrier: bool,
-    half_wave_loss: bool,
-) -> tuple[ComplexArray, ComplexArray]:
-    """`_wavefront` of a component of the field."""
-    from fringetrace.field.wavefront import assemble
-
-    lights, count = [], 1
-    for _, chunks in groupby(zip(parts, numbers, strict=True), lambda part: id(part[0].source)):
-        some, its = zip(*chunks, strict=True)
-        number = np.concatenate(its)
-        count = max(count, int(number.max(initial=0)) + 1)
-        lights.append(assemble.light(join(some), number, half_wave_loss, axis))
-    assert parts[0].ccd is not None
-    return assemble.fields(lights, count, parts[0].ccd.shape, wavelength, carrier)
+    return first, chain([first], rest)

@@ -1,4 +1,4 @@
-"""Fused loops over pixels: their sample points, cut along edges where any cross them, and means over them.
+"""Compiled pixel quadrature: sample points, pixels cut along edges, and weighted means.
 
 Sample points are in compressed rows: those of pixel i of a band are first[i] to first[i + 1].
 """
@@ -11,28 +11,96 @@ from fringetrace.core import grown, jit, part
 
 
 @jit
-def average(first, weight, field, mean, mutual):
-    """Weighted means over the samples of each pixel of the fields, and of E_m conj(E_n)."""
-    groups = len(field)
+def add_means(first, weight, field, where, share, total):
+    """Add weighted means over the samples of some pixels of the fields to images, times `share`."""
+    columns = where.shape[1]
     for pixel in range(len(first) - 1):
+        i, j = pixel // columns, pixel % columns
+        if where[i, j]:
+            for m in range(len(field)):
+                mean = 0.0j
+                for k in range(first[pixel], first[pixel + 1]):
+                    mean += weight[k] * field[m, k]
+                total[m, i, j] += share * mean
+
+
+@jit
+def add_mean_products(first, weight, field, where, share, total):
+    """Add those of E_m conj(E_n), (groups**2, rows, columns)."""
+    groups, columns = len(field), where.shape[1]
+    for pixel in range(len(first) - 1):
+        i, j = pixel // columns, pixel % columns
+        if not where[i, j]:
+            continue
         for m in range(groups):
-            total = 0.0j
-            for k in range(first[pixel], first[pixel + 1]):
-                total += weight[k] * field[m, k]
-            mean[m, pixel] = total
             for n in range(m, groups):
                 real, imaginary = 0.0, 0.0
                 for k in range(first[pixel], first[pixel + 1]):
                     one, other = field[m, k], field[n, k]
                     real += weight[k] * (one.real * other.real + one.imag * other.imag)
                     imaginary += weight[k] * (one.imag * other.real - one.real * other.imag)
-                mutual[m, n, pixel] = complex(real, imaginary)
-                mutual[n, m, pixel] = complex(real, -imaginary)
+                total[m * groups + n, i, j] += share * complex(real, imaginary)
+                if n > m:
+                    total[n * groups + m, i, j] += share * complex(real, -imaginary)
+
+
+@part
+def term(field, m, n, products, i, j):
+    """E_m conj(E_n) of a pixel, or E_m."""
+    one, other = field[m, i, j], field[n, i, j]
+    if not products:
+        return one
+    real = one.real * other.real + one.imag * other.imag
+    return complex(real, one.imag * other.real - one.real * other.imag)
+
+
+@part
+def correction(field, m, n, products, i, j):
+    """(f_xx + f_yy) / 24 at a pixel of such an image, by differences; 0 at the rim."""
+    _, rows, columns = field.shape
+    if i == 0 or j == 0 or i == rows - 1 or j == columns - 1:
+        return 0.0j
+    beside = term(field, m, n, products, i, j + 1) + term(field, m, n, products, i, j - 1)
+    above = term(field, m, n, products, i + 1, j) + term(field, m, n, products, i - 1, j)
+    return (above + beside - 4.0 * term(field, m, n, products, i, j)) / 24.0
+
+
+@jit
+def largest(field, products):
+    """Largest size of the corrections, and of the values, of fields (groups, rows, columns) or products."""
+    groups, rows, columns = field.shape
+    bend, value = np.zeros((rows, columns)), np.zeros((rows, columns))
+    for i in range(rows):
+        for j in range(columns):
+            for m in range(groups):
+                for n in range(m, groups if products else m + 1):
+                    bent = correction(field, m, n, products, i, j)
+                    here = term(field, m, n, products, i, j)
+                    bend[i, j] = max(bend[i, j], bent.real**2 + bent.imag**2)
+                    value[i, j] = max(value[i, j], here.real**2 + here.imag**2)
+            bend[i, j], value[i, j] = np.sqrt(bend[i, j]), np.sqrt(value[i, j])
+    return bend, value
+
+
+@jit
+def add_even(field, order, share, products, total):
+    """Add corrected values at the centres of pixels without samples to images, times `share`."""
+    groups, rows, columns = field.shape
+    for i in range(rows):
+        for j in range(columns):
+            if order[i, j] > 0:
+                continue
+            for m in range(groups):
+                for n in range(m, groups if products else m + 1):
+                    mean = term(field, m, n, products, i, j) + correction(field, m, n, products, i, j)
+                    total[m * groups + n if products else m, i, j] += share * mean
+                    if n > m:
+                        total[n * groups + m, i, j] += share * complex(mean.real, -mean.imag)
 
 
 @jit
 def lattice(order, columns, top, nodes, weights, first, x, y, weight):
-    """Gauss points of the pixels of a band: order[i] x order[i] of them in pixel i, none where it is 0.
+    """Gauss points of the pixels of a band: order[i] x order[i] in pixel i, none where it is 0.
 
     `nodes`, `weights` are tables by order, on [0, 1].
     """
@@ -82,7 +150,7 @@ CORNERS, PIECES = 32, 1024
 
 @part
 def clip(polygon, corners, a, b, c, sign, result):
-    """The part of a convex polygon where sign (a x + b y - c) >= 0; its corners."""
+    """Clip a convex polygon to the half-plane sign (a x + b y - c) >= 0; its corners."""
     count = 0
     for i in range(corners):
         j = i + 1 if i + 1 < corners else 0
@@ -101,7 +169,7 @@ def clip(polygon, corners, a, b, c, sign, result):
 
 @jit
 def shatter(x, y, size, lines, segments, polygons, corners):
-    """Cut a square by the lines of some segments; how many pieces."""
+    """Cut a square by the lines of segments; number of pieces."""
     for i in range(4):
         polygons[0, i, 0] = x + (size if i == 1 or i == 2 else 0.0)
         polygons[0, i, 1] = y + (size if i >= 2 else 0.0)
@@ -132,7 +200,7 @@ def shatter(x, y, size, lines, segments, polygons, corners):
 
 @jit
 def cut(pixels, parts, begin, lines, segments, columns, rule):
-    """Sample points of pixels that edges cross: columns x, y, weight, and a point sure of its side.
+    """Sample points of pixels that edges cross: columns x, y, weight, and a point certain to be on its side.
 
     Each pixel, in parts x parts squares, is cut by the lines of its segments into convex pieces,
     those into triangles with the points of `rule`: barycentric a, b, c and weight. Also returns how

@@ -1,4 +1,4 @@
-"""Sums of many rays at many wavelengths at once: the non-uniform FFT from optical path to wavenumber."""
+"""Coherent sum of rays at many wavelengths by non-uniform FFT from optical path to wavenumber."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def spectrum(
 
 
 def direct(length: npt.ArrayLike, amplitude: npt.ArrayLike, wavelengths: npt.ArrayLike) -> ComplexArray:
-    """`spectrum` by all exponentials, each of an exact remainder: rays times wavelengths of them.
+    """Coherent sum of rays at each wavelength like `spectrum`, by all exponentials.
 
     Parameters
     ----------

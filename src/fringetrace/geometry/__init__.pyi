@@ -1,7 +1,7 @@
 from . import forms as forms, meshes as meshes, shapes as shapes
 from .facet_sag import standoff as standoff
 from .forms import Conic as Conic, Cylinder as Cylinder, Form as Form, Sphere as Sphere
-from .implicit import Fit as Fit, LevelFit as LevelFit, Meeting as Meeting, dot as dot
+from .implicit import Fit as Fit, LevelFit as LevelFit, Meeting as Meeting
 from .mesh import Mesh as Mesh, as_mesh as as_mesh
 from .meshes import interpolate_height as interpolate_height
 from .pn_triangles import Patches as Patches

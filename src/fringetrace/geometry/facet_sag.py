@@ -1,15 +1,11 @@
-"""How far facets stand off the smooth surface that they may stand for, told from their neighbours."""
+"""Facet sag: distance of facets from the smooth surface that they approximate, estimated from neighbours."""
 
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-from fringetrace.core import FloatArray, unit
-from fringetrace.geometry.implicit import dot
-from fringetrace.geometry.triangles import weld
-
-IndexArray = npt.NDArray[np.int64]
+from fringetrace.core import FloatArray, dot, unit
+from fringetrace.geometry.triangles import IndexArray, weld
 
 # Facets whose normals are more than 30 degrees (cosine) apart meet in an edge of the part.
 SHARP = 0.8660254037844387
@@ -18,7 +14,7 @@ SHARP = 0.8660254037844387
 def standoff(
     vertices: FloatArray, faces: IndexArray, chosen: IndexArray, points: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Height of the smooth surface behind the facets over points on them, and how it leans there.
+    """Sag and slope error of facets at points on them, against the smooth surface behind them.
 
     Along each side of a facet the surface bends as the normals at its two ends say; each is the
     mean over the facets around the vertex that make no sharp edge with this one. The lesser of the

@@ -1,4 +1,4 @@
-"""The exact surface behind the facets: the mesh finds a hit, the form decides where it is.
+"""Exact surface forms behind facets: the mesh finds a hit, the form moves it onto the exact surface.
 
 Each form fits itself to a mesh; the fit moves hits along their rays onto the form and tells the
 true normal there.
@@ -20,9 +20,11 @@ from fringetrace.core import (
     checked_rotation,
     checked_vector,
     component,
+    dot,
+    filled,
     unit,
 )
-from fringetrace.geometry.implicit import EPSILON, Fit, dot, fit_level
+from fringetrace.geometry.implicit import EPSILON, Fit, fit_level
 from fringetrace.geometry.pn_triangles import patched, vertex_normals
 
 # Past its equator by no more than this, in radii squared, a conic is at it.
@@ -30,13 +32,13 @@ EQUATOR = 4.0 * EPSILON
 
 
 class Form(Protocol):
-    """Anything that can be fitted to a mesh."""
+    """Protocol of exact surfaces that can be fitted to a mesh."""
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
-        """Get to know the mesh, (v, 3) metres and (f, 3)."""
+        """Fit of the form to a mesh, (v, 3) metres and (f, 3)."""
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
-        """The form turned about the origin, then shifted; as `Mesh.moved`."""
+        """The form rotated about the origin, then shifted; as `Mesh.moved`."""
 
 
 def _positive(value: float, what: str) -> float:
@@ -51,7 +53,7 @@ def _turned(vector: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Sphere:
-    """A sphere.
+    """Sphere as the exact form of a surface.
 
     Parameters
     ----------
@@ -72,23 +74,23 @@ class Sphere:
         object.__setattr__(self, "radius", _positive(self.radius, "Sphere radius"))
 
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(rho^2 - r^2) / 2r, the distance from the surface near it; see `Level`."""
+        """Level function (rho^2 - r^2) / 2r, the distance to the surface near it; see `Level`."""
         spoke = (point - self.centre) / self.radius
         value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
         return value, spoke, np.full(len(point), 1.0 / self.radius)
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
-        """The sphere on a mesh; see `Form`."""
+        """Fit of the sphere to a mesh; see `Form`."""
         return fit_level(self, vertices, faces, complete=True)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Sphere:
-        """The sphere turned about the origin, then shifted; as `Mesh.moved`."""
+        """The sphere rotated about the origin, then shifted; as `Mesh.moved`."""
         return Sphere(_turned(self.centre, turn) + checked_vector(offset, "offset"), self.radius)
 
 
 @dataclass(frozen=True, eq=False)
 class Cylinder:
-    """A circular cylinder without ends.
+    """Infinite circular cylinder as the exact form of a surface.
 
     Parameters
     ----------
@@ -113,25 +115,25 @@ class Cylinder:
         object.__setattr__(self, "radius", _positive(self.radius, "Cylinder radius"))
 
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(rho^2 - r^2) / 2r, the distance from the surface near it; see `Level`."""
+        """Level function (rho^2 - r^2) / 2r, the distance to the surface near it; see `Level`."""
         offset = point - self.point
         spoke = (offset - np.outer(component(offset, self.axis), self.axis)) / self.radius
         value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
         return value, spoke, (1.0 - component(direction, self.axis) ** 2) / self.radius
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
-        """The cylinder on a mesh; see `Form`."""
+        """Fit of the cylinder to a mesh; see `Form`."""
         return fit_level(self, vertices, faces, complete=True)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Cylinder:
-        """The cylinder turned about the origin, then shifted; as `Mesh.moved`."""
+        """The cylinder rotated about the origin, then shifted; as `Mesh.moved`."""
         point = _turned(self.point, turn) + checked_vector(offset, "offset")
         return Cylinder(point, _turned(self.axis, turn), self.radius)
 
 
 @dataclass(frozen=True, eq=False)
 class Conic:
-    """A conic of revolution, with aspheric terms.
+    """Conic of revolution with even aspheric terms.
 
     Height over the vertex plane at a distance r from the axis:
     z = c r^2 / (1 + sqrt(1 - (1 + k) c^2 r^2)) + a_0 r^4 + a_1 r^6 + ..., c = 1 / radius.
@@ -172,7 +174,7 @@ class Conic:
             )
 
     def sag(self, square: FloatArray) -> FloatArray:
-        """Height of the surface over its vertex plane.
+        """Sag: height of the surface over its vertex plane.
 
         Parameters
         ----------
@@ -193,7 +195,7 @@ class Conic:
         return np.asarray(height, dtype=np.float64)
 
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Height above the surface; z - (c r^2 + c (1 + k) z^2) / 2 without terms. See `Level`."""
+        """Level function: height over the surface; z - (c r^2 + c (1 + k) z^2) / 2 without terms."""
         c, k = 1.0 / self.radius, self.conic
         offset = point - self.vertex
         z, dz = component(offset, self.axis), component(direction, self.axis)
@@ -214,18 +216,18 @@ class Conic:
         return z - self.sag(square), self.axis - 2.0 * first[:, None] * across, bend
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
-        """The conic on a mesh; see `Form`."""
+        """Fit of the conic to a mesh; see `Form`."""
         return fit_level(self, vertices, faces, complete=not self.terms)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Conic:
-        """The conic turned about the origin, then shifted; as `Mesh.moved`."""
+        """The conic rotated about the origin, then shifted; as `Mesh.moved`."""
         vertex = _turned(self.vertex, turn) + checked_vector(offset, "offset")
         return Conic(vertex, _turned(self.axis, turn), self.radius, self.conic, self.terms)
 
 
 @dataclass(frozen=True, eq=False)
 class HeightField:
-    """Heights on a grid, with a bicubic spline between them; lies as the mesh of `shapes.height_map`.
+    """Height field: bicubic spline over a grid of heights, placed as `shapes.height_map` places its mesh.
 
     Parameters
     ----------
@@ -248,7 +250,7 @@ class HeightField:
     turn: FloatArray | None = None
 
     def __post_init__(self) -> None:
-        heights = np.array(self.heights, dtype=np.float64)
+        heights = filled(self.heights).copy()
         if heights.ndim != 2 or min(heights.shape) < 4 or not np.isfinite(heights).all():
             raise ValueError(
                 f"HeightField heights: expected 4 x 4 finite numbers or more, got shape {heights.shape}"
@@ -263,7 +265,7 @@ class HeightField:
 
     @cached_property
     def spline(self) -> Any:
-        """The spline, of y and x."""
+        """Bicubic spline of the heights over (y, x)."""
         from scipy.interpolate import RectBivariateSpline
 
         pitch_x, pitch_y = np.broadcast_to(self.pitch, 2)
@@ -273,7 +275,7 @@ class HeightField:
         return RectBivariateSpline(y, x, self.heights)
 
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Height above the spline; see `Level`."""
+        """Level function: height over the spline; see `Level`."""
         turn = np.asarray(self.turn)
         x, y, z = (component(point - self.offset, axis) for axis in turn.T)
         dx, dy = (component(direction, axis) for axis in turn.T[:2])
@@ -286,13 +288,13 @@ class HeightField:
         return z - height[0, 0], gradient, bend
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
-        """The spline on a mesh; see `Form`."""
+        """Fit of the spline to a mesh; see `Form`."""
         return fit_level(self, vertices, faces, complete=False)
 
     def moved(
         self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None
     ) -> HeightField:
-        """The height field turned about the origin, then shifted; as `Mesh.moved`."""
+        """The height field rotated about the origin, then shifted; as `Mesh.moved`."""
         place = _turned(self.offset, turn) + checked_vector(offset, "offset")
         own = np.asarray(self.turn)
         both = own if turn is None else checked_rotation(turn, "turn") @ own
@@ -301,7 +303,7 @@ class HeightField:
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """A curved patch over each face, from the normals at the vertices: for a mesh of a smooth part.
+    """Smooth form of any mesh: a curved PN triangle over each face, from vertex normals.
 
     Hits are off the part that was meant by the fourth power of the length of the facets' sides where
     the normals are right, the third at worst; facets themselves, by the second.
@@ -323,7 +325,7 @@ class Smooth:
     def __post_init__(self) -> None:
         if self.normals is None:
             return
-        normals = np.array(self.normals, dtype=np.float64)
+        normals = filled(self.normals).copy()
         if (
             normals.ndim != 2
             or normals.shape[1] != 3
@@ -338,7 +340,7 @@ class Smooth:
         object.__setattr__(self, "normals", normals)
 
     def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
-        """Patches over a mesh; see `Form`."""
+        """Curved patches fitted to a mesh; see `Form`."""
         normals = vertex_normals(vertices, faces) if self.normals is None else self.normals
         if len(normals) != len(vertices):
             raise ValueError(
@@ -347,7 +349,7 @@ class Smooth:
         return patched(vertices, faces, normals)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
-        """The normals turned; as `Mesh.moved`."""
+        """The normals rotated; as `Mesh.moved`."""
         if self.normals is None or turn is None:
             return self
         return Smooth(np.asarray(self.normals @ checked_rotation(turn, "turn").T))

@@ -1,4 +1,4 @@
-"""Where rays cross a smooth surface given by the points at which a function, its level, is 0."""
+"""Implicit surfaces: intersection of rays with the zero level of a function, by Newton steps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, unit
+from fringetrace.core import Array, FloatArray, dot, unit
 
 EPSILON = float(np.finfo(np.float64).eps)
 # Vertices this part of the mesh's size off the form are not meant to lie on it.
@@ -23,7 +23,7 @@ ROUNDINGS = 256.0
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """Where rays meet a form, one row each; NaN where they do not.
+    """Intersections of rays with a form, one row each; NaN where a ray misses.
 
     `path` (n,) and `point` (n, 3) in metres, `normal` (n, 3) along the gradient, `face` (n,).
     """
@@ -35,7 +35,7 @@ class Meeting:
 
 
 class Fit(Protocol):
-    """A form that knows its mesh.
+    """Protocol of forms that are fitted to a mesh.
 
     `along` (f,) tells for each face whether its front is on the side that the gradient points to (1)
     or not (-1); 0: the face is not part of the form. `sag` is the largest distance in metres of the
@@ -54,7 +54,7 @@ class Fit(Protocol):
     def meet(
         self, origin: FloatArray, direction: FloatArray, path: FloatArray, side: FloatArray, face: Array
     ) -> Meeting:
-        """Move hits onto the form, along their rays.
+        """Move hits along their rays onto the form.
 
         Parameters
         ----------
@@ -73,19 +73,14 @@ class Fit(Protocol):
 
 
 class Level(Protocol):
-    """A form given by a function of the point."""
+    """Protocol of forms given by a level function of the point."""
 
     def level(self, point: FloatArray, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The function (n,), its gradient (n, 3), and its second derivative along the directions (n,)."""
-
-
-def dot(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Scalar products (n,) of the rows of (n, 3)."""
-    return np.asarray(np.einsum("ij,ij->i", a, b), dtype=np.float64)
+        """Level function (n,), its gradient (n, 3), and its second derivative along directions (n,)."""
 
 
 def advance(value: FloatArray, slope: FloatArray, bend: FloatArray, side: FloatArray) -> FloatArray:
-    """Way to the root of value + slope s + bend s^2 / 2 at which the slope has the sign of `side`.
+    """Root of value + slope s + bend s^2 / 2 at which the slope has the sign of `side`.
 
     Where there is none: to the extremum.
     """
@@ -97,7 +92,7 @@ def advance(value: FloatArray, slope: FloatArray, bend: FloatArray, side: FloatA
 
 @dataclass(frozen=True, eq=False)
 class LevelFit:
-    """A level function fitted to a mesh; fields as in `Fit`, and the size of the mesh in metres."""
+    """Level function fitted to a mesh; fields as in `Fit`, and the size of the mesh in metres."""
 
     form: Level
     along: npt.NDArray[np.int8]
@@ -106,7 +101,7 @@ class LevelFit:
     size: float
 
     def guess(self, origin: FloatArray, direction: FloatArray, side: FloatArray) -> FloatArray:
-        """Way (n,) in metres along rays to a quadric, one step from `origin`; NaN or nonsense if none."""
+        """Distance (n,) in metres along rays to a quadric, one step from `origin`; NaN if there is none."""
         with np.errstate(all="ignore"):
             value, gradient, bend = self.form.level(origin, direction)
             return advance(value, dot(gradient, direction), bend, side)
@@ -138,7 +133,7 @@ class LevelFit:
 
 
 def fit_level(form: Level, vertices: FloatArray, faces: npt.NDArray[np.int64], complete: bool) -> LevelFit:
-    """Find out which faces of a mesh lie along a form.
+    """Fit of a form to a mesh: which faces lie on the form.
 
     Parameters
     ----------

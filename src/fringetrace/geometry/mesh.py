@@ -1,4 +1,4 @@
-"""The noun Mesh: triangles in space, checked once, at the door."""
+"""Triangle mesh: vertices in metres and faces, checked once."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, checked_rotation, checked_vector
+from fringetrace.core import Array, FloatArray, checked_rotation, checked_vector, filled
 
 # A face is degenerate when its height is below this part of its longest side: less than what
 # float64 coordinates can express, and far below any needle that still has a normal.
@@ -30,7 +30,7 @@ def _named(indices: Array, limit: int = 5) -> str:
 
 def _checked_vertices(value: Any, name: str) -> FloatArray:
     try:
-        vertices = np.array(value, dtype=np.float64)
+        vertices = filled(value).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name} vertices: expected numbers of shape (v, 3), got {error}") from error
     if vertices.ndim != 2 or vertices.shape[1] != 3:
@@ -54,6 +54,9 @@ def _checked_faces(value: Any, count: int, name: str) -> npt.NDArray[np.int64]:
         raise ValueError(f"{name} faces: expected at least one triangle, got none")
     if raw.ndim != 2 or raw.shape[1] != 3:
         raise ValueError(f"{name} faces: expected shape (f, 3), got {raw.shape}")
+    if np.ma.is_masked(value):
+        masked = int(np.ma.getmaskarray(value).sum())
+        raise ValueError(f"{name} faces: expected whole triangles, got {masked} masked corners")
     if not np.issubdtype(raw.dtype, np.integer):
         raise ValueError(f"{name} faces: expected integers, got {raw.dtype}")
     bad = np.flatnonzero((raw < 0).any(axis=1) | (raw >= count).any(axis=1))
@@ -97,7 +100,7 @@ def _check_shape(vertices: FloatArray, faces: npt.NDArray[np.int64], name: str) 
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """Where a mesh came from, by which a scene file can refer to it.
+    """Origin of a mesh (file and moves), by which a scene file can refer to it.
 
     Parameters
     ----------
@@ -114,13 +117,13 @@ class Source:
     moves: tuple[tuple[FloatArray, FloatArray | None], ...] = ()
 
     def moved(self, offset: FloatArray, turn: FloatArray | None) -> Source:
-        """The same after one more move."""
+        """The same origin after one more move."""
         return Source(self.path, self.unit, (*self.moves, (offset, turn)))
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles in space.
+    """Triangle mesh: vertices in metres and faces.
 
     Parameters
     ----------
@@ -158,7 +161,7 @@ class Mesh:
 
     @staticmethod
     def cleaned(vertices: npt.ArrayLike, faces: npt.ArrayLike, name: str = "mesh") -> Mesh:
-        """A mesh without the faces that have no area.
+        """Mesh without the faces of zero area.
 
         Parameters
         ----------
@@ -180,12 +183,12 @@ class Mesh:
 
     @cached_property
     def bounds(self) -> FloatArray:
-        """(2, 3) float64, metres: lower and upper corner of what the faces span."""
+        """Bounding box of the faces, (2, 3) float64, metres: lower and upper corner."""
         corners = self.vertices[self.faces].reshape(-1, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Mesh:
-        """The mesh turned about the origin, then shifted.
+        """Mesh rotated about the origin, then shifted.
 
         Parameters
         ----------
@@ -210,7 +213,7 @@ class Mesh:
 
 
 def as_mesh(value: Any, name: str = "mesh") -> Mesh:
-    """A Mesh from one of another library, whose numbers are taken as metres.
+    """Mesh converted from trimesh or pyvista, whose numbers are taken as metres.
 
     Parameters
     ----------

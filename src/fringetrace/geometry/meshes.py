@@ -1,4 +1,4 @@
-"""Meshes in files and other libraries: load, save, give; the height above points; and the built shapes.
+"""Mesh files (STL, PLY, OBJ, GLB, NPZ, Zygo) and conversion to trimesh and pyvista; height of a mesh.
 
 Meshes are `fringetrace.geometry.mesh.Mesh`, in metres. Height maps are arrays [row, column] with origin
 lower: column counts along x, row along y, heights along z, seen from +z.
@@ -31,7 +31,7 @@ from fringetrace.geometry.shapes import (
     step,
 )
 from fringetrace.geometry.triangles import IndexArray, height_above, weld
-from fringetrace.geometry.zygo import KINDS, existing, read_height_map, write_height_map
+from fringetrace.geometry.zygo import KINDS, existing_file, read_height_map, write_height_map
 
 if TYPE_CHECKING:
     from pyvista import PolyData
@@ -62,7 +62,7 @@ ARCHIVE = ".npz"
 
 
 def load(path: str | os.PathLike[str], unit: str | None = None) -> Mesh:
-    """Mesh from a file: STL, PLY, OBJ, GLB, and whatever else trimesh can read; Zygo `.dat`, `.datx`; `.npz`.
+    """Load a mesh from STL, PLY, OBJ, GLB, other trimesh formats, Zygo `.dat` and `.datx`, or `.npz`.
 
     Vertices with equal coordinates are welded and faces without area dropped. A file of several
     parts becomes one mesh, each part where the file puts it; the faces of a part keep their order.
@@ -98,13 +98,13 @@ def _loaded(path: str | os.PathLike[str], unit: str | None) -> Mesh:
         z, pitch = read_height_map(path)
         return height_map(z, pitch, name=Path(path).name)
     if suffix == ARCHIVE:
-        return _archived(existing(path), unit_length(unit, f"{Path(path).name} unit"))
+        return _archived(existing_file(path), unit_length(unit, f"{Path(path).name} unit"))
     from trimesh.exchange.load import mesh_formats
 
     known = sorted({*KINDS, ARCHIVE} | {f".{kind}" for kind in mesh_formats()})
     if suffix not in known:
         raise ValueError(f"{path}: expected a file named {', '.join(known)}, got {suffix or 'no suffix'!r}")
-    file = existing(path)
+    file = existing_file(path)
     scale = unit_length(unit, f"{file.name} unit")
     vertices, faces = weld(*_parsed(file))
     try:
@@ -165,7 +165,7 @@ def _refuse_relative(file: Path) -> None:
 
 
 def save(mesh: Mesh, path: str | os.PathLike[str], unit: str) -> None:
-    """Write a mesh to a STL (binary), PLY, OBJ, GLB or NPZ file.
+    """Save a mesh as STL (binary), PLY, OBJ, GLB or NPZ.
 
     NPZ keeps all bits (of metres), OBJ 17 decimals of the unit, the others 7 digits (float32). The file
     is written beside its target and then moved into place.
@@ -209,7 +209,7 @@ def _content(vertices: FloatArray, faces: IndexArray, file: Path) -> Any:
 
 
 def to_trimesh(mesh: Mesh) -> Trimesh:
-    """A mesh for trimesh, in metres, with its vertices and faces as they are.
+    """Convert a mesh to trimesh, in metres, with the same vertices and faces.
 
     Parameters
     ----------
@@ -229,7 +229,7 @@ def to_trimesh(mesh: Mesh) -> Trimesh:
 
 
 def to_pyvista(mesh: Mesh) -> PolyData:
-    """A mesh for pyvista, in metres, with its vertices and faces as they are.
+    """Convert a mesh to pyvista, in metres, with the same vertices and faces.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ def to_pyvista(mesh: Mesh) -> PolyData:
 
 
 def elevation_sample(relief: float, aperture: float) -> tuple[FloatArray, float]:
-    """Matplotlib's sample elevation map, scaled down to something a laser can measure.
+    """Mesh of matplotlib's sample elevation map, scaled down to a relief that a laser can measure.
 
     The file is that of the Jacksboro fault, Tennessee, from the Shuttle radar: 344 x 403 samples,
     three seconds of arc apart, 840 m of relief over some 30 km. Both are scaled linearly, the
@@ -280,14 +280,14 @@ def elevation_sample(relief: float, aperture: float) -> tuple[FloatArray, float]
     found = importlib.util.find_spec("matplotlib")  # finds the folder without importing it
     folder = Path(found.origin).parent if found is not None and found.origin else Path()
     file = folder / "mpl-data" / "sample_data" / "jacksboro_fault_dem.npz"
-    with np.load(existing(file), allow_pickle=False) as data:
+    with np.load(existing_file(file), allow_pickle=False) as data:
         metres = data["elevation"][::-1].astype(np.float64)
     z = relief * (metres - metres.min()) / np.ptp(metres)
     return z, aperture / (max(z.shape) - 1)
 
 
 def interpolate_height(mesh: Mesh, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatArray:
-    """Height of a mesh over points of the x-y plane, in float64 and without the ray engine.
+    """Height of a mesh over points of the x-y plane, in float64, independent of the ray tracer.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Curved patches through the vertices of a mesh and across to their normals: a smooth form for any mesh.
+"""PN triangles: curved patches through the vertices of a mesh and normal to its vertex normals.
 
 Over each face stands a cubic Bezier triangle whose rim depends only on the two vertices and normals
 at its ends, so that neighbours meet along it. Source: Vlachos et al., "Curved PN triangles" (2001),
@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, unit
-from fringetrace.geometry.implicit import EPSILON, ROUNDINGS, STEPS, Meeting, advance, dot
+from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.geometry.implicit import EPSILON, ROUNDINGS, STEPS, Meeting, advance
 
 # Vertex normals may lean this far (cosine) from a face's: beyond, the mesh has an edge there.
 LEAN = 0.75
@@ -26,7 +26,7 @@ FEET = 4
 
 
 def vertex_normals(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> FloatArray:
-    """Normals at the vertices, exact where the vertices lie on a sphere.
+    """Vertex normals of a mesh, exact where the vertices lie on a sphere.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def vertex_normals(vertices: FloatArray, faces: npt.NDArray[np.int64]) -> FloatA
 
 
 def neighbours(faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Faces (f, 3) across the side opposite to each corner, -1 where the mesh ends.
+    """Neighbouring faces (f, 3), opposite to each corner; -1 at the boundary of the mesh.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def _bends(u: FloatArray, v: FloatArray, p: FloatArray, q: FloatArray) -> FloatA
 
 @dataclass(frozen=True, eq=False)
 class Patches:
-    """Curved patches of a mesh; a `forms.Fit`.
+    """Curved patches over a mesh; a `forms.Fit`.
 
     `frame` (f, 3, 3) rows: two axes in the face's plane, its normal; `powers` (f, 10, 3) metres: the
     patch in that frame, from the centre of the face; `flat` (f, 2, 3): from places to parameters.
@@ -142,7 +142,7 @@ class Patches:
     def level(
         self, point: FloatArray, direction: FloatArray, face: Array
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Height over a patch along its face's normal, and the parameters (n, 2) of its foot; cf. `Level`."""
+        """Height over a patch along its face normal, and parameters (n, 2) of its foot point; cf. `Level`."""
         frame, powers, flat = self.frame[face], self.powers[face], self.flat[face]
         local = np.einsum("nij,nj->ni", frame, point - self.centre[face])
         along = np.einsum("nij,nj->ni", frame, direction)
@@ -177,7 +177,7 @@ class Patches:
     def meet(
         self, origin: FloatArray, direction: FloatArray, path: FloatArray, side: FloatArray, face: Array
     ) -> Meeting:
-        """Move hits onto the patches, over to their neighbours where they slide off; see `Fit.meet`."""
+        """Move hits onto the patches, across to neighbours where they leave theirs; see `Fit.meet`."""
         path, face = path.copy(), np.array(face, dtype=np.int64)
         rows = np.arange(len(path))
         with np.errstate(all="ignore"):
@@ -210,7 +210,7 @@ def _solved(du: FloatArray, dv: FloatArray, goal: FloatArray) -> tuple[FloatArra
 
 
 def patched(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatArray) -> Patches:
-    """Curved patches over a mesh.
+    """Fit curved patches to a mesh.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Shapes from a few numbers: plates, steps, height maps, extrusions, spheres, corners, lattices of rods.
+"""Shapes: meshes of plates, steps, height maps, extrusions, spheres, corner cubes and rod lattices.
 
 Everything built is a `fringetrace.geometry.mesh.Mesh` in metres, welded.
 """
@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_length, unit
+from fringetrace.core import FloatArray, checked_length, filled, unit
 from fringetrace.geometry.mesh import Mesh
-from fringetrace.geometry.triangles import IndexArray, crossing, doubled_area, triangulate, weld
+from fringetrace.geometry.triangles import IndexArray, doubled_area, self_crossing, triangulate, weld
 
 _G = 0.5 + math.sqrt(1.25)  # golden ratio
 # fmt: off
@@ -49,7 +49,7 @@ def _checked_pitch(pitch: float | tuple[float, float], what: str) -> tuple[float
 
 
 def height_map(z: npt.ArrayLike, pitch: float | tuple[float, float], *, name: str = "height map") -> Mesh:
-    """Mesh of heights on a grid, centred on the z axis; its front is +z.
+    """Mesh of a height map on a grid, centred on the z axis; its front is +z.
 
     Four neighbouring samples make two triangles, cut from the first to the last of them; where
     one is missing the other three make one. Triangles come cell by cell, row by row; vertices
@@ -58,7 +58,7 @@ def height_map(z: npt.ArrayLike, pitch: float | tuple[float, float], *, name: st
     Parameters
     ----------
     z : (rows, columns) float64, metres
-        NaN: a hole.
+        NaN, or masked as in numpy.ma: a hole.
     pitch : float, or (along x, along y), metres
         Distance of neighbouring samples.
     name : str
@@ -73,7 +73,7 @@ def height_map(z: npt.ArrayLike, pitch: float | tuple[float, float], *, name: st
     ValueError
         If there are fewer than 2 x 2 samples or no three valid neighbours, or a pitch is not positive.
     """
-    heights = np.asarray(z, dtype=np.float64)
+    heights = filled(z)
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise ValueError(f"{name}: expected 2 x 2 samples or more, got shape {heights.shape}")
     pitch_x, pitch_y = _checked_pitch(pitch, f"{name} pitch")
@@ -102,7 +102,7 @@ def _cells(grid: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def extrude(polyline: npt.ArrayLike, depth: float, *, closed: bool = False, name: str = "extrusion") -> Mesh:
-    """A line of the x-z plane swept along y: scenes of a study in 2D become meshes.
+    """Mesh of a profile in the x-z plane, extruded along y.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def extrude(polyline: npt.ArrayLike, depth: float, *, closed: bool = False, name
         For fewer than 2 points (3 if closed), points that are not finite, neighbours that
         coincide, a depth that is not positive, a closed line that meets itself.
     """
-    points = np.array(polyline, dtype=np.float64)
+    points = filled(polyline).copy()
     least = 3 if closed else 2
     if points.ndim != 2 or points.shape[1] != 2 or len(points) < least:
         raise ValueError(f"{name}: expected points of shape (k, 2), k from {least}, got {points.shape}")
@@ -151,7 +151,7 @@ def extrude(polyline: npt.ArrayLike, depth: float, *, closed: bool = False, name
 
 def _with_caps(sheet: IndexArray, polygon: FloatArray, name: str) -> IndexArray:
     """The strips turned to face outwards, and both ends filled."""
-    meets = crossing(polygon)
+    meets = self_crossing(polygon)
     if meets:
         raise ValueError(
             f"{name}: expected a line that does not meet itself, got segments {meets[0]} and {meets[1]}"
@@ -163,7 +163,7 @@ def _with_caps(sheet: IndexArray, polygon: FloatArray, name: str) -> IndexArray:
 
 
 def plate(width: float, height: float, thickness: float | None = None) -> Mesh:
-    """A rectangle in the plane z = 0, centred, its front +z; with a thickness, a box below it.
+    """Mesh of a rectangle in the plane z = 0, centred, its front +z; with a thickness, a box below it.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def plate(width: float, height: float, thickness: float | None = None) -> Mesh:
 
 
 def step(width: float, height: float, edge: float, rise: float) -> Mesh:
-    """A mirror with a step: z = 0 for x < edge, z = rise beyond, an upright riser between.
+    """Mesh of a step: z = 0 for x < edge, z = rise beyond, with a vertical riser.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def step(width: float, height: float, edge: float, rise: float) -> Mesh:
 
 
 def staircase(width: float, height: float, treads: int, rise: float) -> Mesh:
-    """Treads of equal width, the first at z = 0, each `rise` above the one before, going to +x.
+    """Mesh of a staircase of equal treads, the first at z = 0, each `rise` higher towards +x.
 
     Parameters
     ----------
@@ -253,7 +253,7 @@ def staircase(width: float, height: float, treads: int, rise: float) -> Mesh:
 
 
 def icosphere(radius: float, subdivisions: int) -> Mesh:
-    """A sphere about the origin, its front outside: an icosahedron, its faces quartered again and again.
+    """Mesh of a sphere about the origin by subdivided icosahedron, its front outside.
 
     Parameters
     ----------
@@ -283,7 +283,7 @@ def icosphere(radius: float, subdivisions: int) -> Mesh:
 
 
 def corner_cube(size: float, subdivisions: int = 1) -> Mesh:
-    """Three square mirrors that meet at right angles in the origin, open towards (1, 1, 1).
+    """Mesh of a corner cube: three square mirrors at right angles, open towards (1, 1, 1).
 
     Parameters
     ----------
@@ -324,7 +324,7 @@ def rod_lattice(
     sides: int = 18,
     stagger: bool = True,
 ) -> Mesh:
-    """A lattice of prisms along y, closed, their front outside: melanin rods, for one.
+    """Mesh of a lattice of closed prisms along y, their front outside.
 
     The axis of rod (column, row) is at x = column * pitch, z = row * pitch, in every second row
     (1, 3, ...) half a pitch further along x; y goes from -length/2 to +length/2. Vertex n of a
@@ -374,7 +374,7 @@ def rod_lattice(
 
 
 def rod_of_triangle(triangle: npt.ArrayLike, sides: int = 18) -> tuple[IndexArray, IndexArray]:
-    """Which rod of a `rod_lattice`, and which facet of it, a triangle belongs to.
+    """Rod and facet numbers of the triangles of a `rod_lattice`.
 
     Each rod has two triangles a facet and sides - 2 in the cap at either end, 4 * sides - 4 in all.
 

@@ -1,4 +1,4 @@
-"""Geometry of bare triangles: welding them, filling a polygon with them, the height of them above a point."""
+"""Geometry of bare triangles: vertex welding, polygon triangulation, height above a point."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PAIRS = 1 << 17
 
 
 def weld(vertices: FloatArray, faces: IndexArray) -> tuple[FloatArray, IndexArray]:
-    """Join the vertices whose coordinates are exactly equal.
+    """Weld vertices with exactly equal coordinates.
 
     Parameters
     ----------
@@ -53,13 +53,13 @@ def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def doubled_area(polygon: FloatArray) -> float:
-    """Twice the area of a polygon (k, 2), positive if it goes round counter-clockwise."""
+    """Doubled signed area of a polygon (k, 2), positive if counter-clockwise."""
     spokes = polygon - polygon[0]
     return float(_cross(spokes, np.roll(spokes, -1, axis=0)).sum())
 
 
-def crossing(polygon: FloatArray) -> tuple[int, int] | None:
-    """Two sides of a closed polygon that meet where they should not.
+def self_crossing(polygon: FloatArray) -> tuple[int, int] | None:
+    """Pair of sides at which a closed polygon intersects itself.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _is_ear(ring: IndexArray, polygon: FloatArray, k: int) -> bool:
 
 
 def triangulate(polygon: FloatArray) -> IndexArray:
-    """Fill a simple polygon with triangles between its corners, by clipping ears (Meisters 1975).
+    """Triangulate a simple polygon by ear clipping (Meisters 1975).
 
     Parameters
     ----------
@@ -173,7 +173,7 @@ def _lying(corners: FloatArray) -> FloatArray:
 
 
 def height_above(corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Height of the topmost triangle above or below each point of the x-y plane.
+    """Height of the topmost triangle at each point of the x-y plane.
 
     The points are sorted into rows and, in each, by x; what a triangle may cover is then one
     run of points in each row that it reaches.
@@ -223,7 +223,7 @@ def height_above(corners: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def breadth(mesh: Mesh) -> float:
-    """The second largest of the extents along x, y, z of a mesh's connected parts, of the smallest, metres.
+    """Breadth of the smallest connected part of a mesh: second largest extent along x, y, z, metres.
 
     Of rods their diameter; of plates and reliefs, however shallow, a side.
     """

@@ -1,4 +1,4 @@
-"""Measured height maps in files of Zygo's programs: MetroPro `.dat` and Mx `.datx`, in and out.
+"""Zygo height-map files, MetroPro `.dat` and Mx `.datx`: reading and writing.
 
 Height maps are arrays [row, column] with origin lower, in metres, NaN where there is no height. The files
 begin with the top row of the picture.
@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace.core import FloatArray, checked_length, checked_wavelength, nm, whole
+from fringetrace.core import FloatArray, checked_length, checked_wavelength, filled, nm, whole
 
 METROPRO, MX = KINDS = (".dat", ".datx")
 # First four bytes of the three versions of MetroPro's format, and of HDF5, which is Mx's.
@@ -28,8 +28,8 @@ NO_DATA = float(np.finfo(np.float64).max)
 SURFACE = "/Data/Surface/{00000000-0000-0000-0000-000000000001}"
 
 
-def existing(path: str | os.PathLike[str]) -> Path:
-    """A path, once it is known to be that of a file.
+def existing_file(path: str | os.PathLike[str]) -> Path:
+    """Checked path of an existing file.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def existing(path: str | os.PathLike[str]) -> Path:
 
 
 def read_height_map(path: str | os.PathLike[str]) -> tuple[FloatArray, float]:
-    """Measured heights from a Zygo MetroPro `.dat` or Mx `.datx` file.
+    """Read measured heights from a Zygo MetroPro `.dat` or Mx `.datx` file.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def read_height_map(path: str | os.PathLike[str]) -> tuple[FloatArray, float]:
     ValueError
         If it is neither of these, is cut short, or was written without a lateral calibration.
     """
-    file = existing(path)
+    file = existing_file(path)
     suffix = file.suffix.lower()
     if suffix not in KINDS:
         raise ValueError(f"{path}: expected a height map named {METROPRO} or {MX}, got {suffix!r}")
@@ -112,7 +112,7 @@ def _mx(file: Path) -> tuple[FloatArray, float]:
 def write_height_map(
     z: FloatArray, pitch: float, path: str | os.PathLike[str], *, wavelength: float = 632.8 * nm
 ) -> None:
-    """Write heights as a Zygo MetroPro `.dat` or Mx `.datx` file; it is there in full or not at all.
+    """Write heights as a Zygo MetroPro `.dat` or Mx `.datx` file, atomically.
 
     A `.dat` file counts heights in wavelength / 65536 (10 pm) and keeps the pitch to 7 digits; a `.datx`
     file keeps all digits of heights in nm.
@@ -120,7 +120,7 @@ def write_height_map(
     Parameters
     ----------
     z : (rows, columns) float64, metres
-        Row 0 is the bottom one; what is not finite becomes "no data".
+        Row 0 is the bottom one; what is not finite, or masked as in numpy.ma, becomes "no data".
     pitch : float, metres
     path : path-like
         Its suffix says the kind.
@@ -132,7 +132,7 @@ def write_height_map(
     ValueError
         If the kind is another one, the array has not two axes, or heights are too large to be counted.
     """
-    heights = np.asarray(z, dtype=np.float64)
+    heights = filled(z)
     if heights.ndim != 2 or heights.size == 0:
         raise ValueError(f"height map: expected shape (rows, columns), got {heights.shape}")
     suffix = Path(path).suffix.lower()

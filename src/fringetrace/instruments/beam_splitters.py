@@ -1,4 +1,4 @@
-"""Real beam splitters: a glass plate with a coating that reflects half of the light, ghosts included."""
+"""Beam-splitter plates: glass with a semi-reflecting coating, ghosts included."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from fringetrace.core import FloatArray, nm, rotation
 from fringetrace.geometry import Mesh, plate
 from fringetrace.instruments.layout import real_index
-from fringetrace.optics import Absorber, Dielectric, Film, Material, as_material, refracted
+from fringetrace.optics import Absorber, Dielectric, Film, Material, as_material, refract
 from fringetrace.scene import Surface
 
 # Sine squared of the incidence at a plate that stands at 45 degrees.
@@ -21,7 +21,7 @@ DESIGN = 587.56 * nm
 def semi_reflecting(
     glass: Material | float | str, wavelength: float = DESIGN, reflectance: float = 0.5
 ) -> Film:
-    """A layer, a quarter of a wave thick at 45 degrees, that reflects so much of s light off glass.
+    """Semi-reflecting layer, a quarter wave thick at 45 degrees, of given reflectance for s light.
 
     Its index follows from r = (Y_0 Y_s - Y_1^2) / (Y_0 Y_s + Y_1^2) with the s admittances Y = n cos
     (Macleod, Thin-Film Optical Filters, ch. 2); it is about 2.45 for half the light, as titania.
@@ -52,7 +52,7 @@ def semi_reflecting(
 
 
 def anti_reflecting(glass: Material | float | str, wavelength: float = DESIGN) -> Film:
-    """A layer that takes away the reflection of s light off a face of glass at 45 degrees.
+    """Antireflection layer for s light on glass at 45 degrees.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def _quarter(admittance2: float, wavelength: float) -> Film:
 
 @dataclass(frozen=True)
 class SplitterPlate:
-    """A plane-parallel glass plate at 45 degrees; a coating on one of its faces reflects half of the light.
+    """Beam-splitter plate: plane-parallel glass at 45 degrees, half-reflecting on one face.
 
     Light comes from the glass side: the sample's arm crosses the glass three times, that of the
     reference once, or with a compensator three times as well.
@@ -113,7 +113,7 @@ class SplitterPlate:
             )
 
     def surfaces(self, half: float) -> tuple[Surface, ...]:
-        """The coated face, through the origin and its front to +x and +z, the other face, the blackened rim.
+        """Surfaces of the plate: coated face through the origin, other face, blackened rim.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class SplitterPlate:
         return coated, self._bare(lower, True, "splitter's other face"), black
 
     def compensator(self, half: float, centre: FloatArray) -> tuple[Surface, ...]:
-        """A plate of the same glass and thickness, parallel to the splitter, uncoated but for `back_coating`.
+        """Compensator plate of the same glass and thickness, parallel to the splitter, uncoated.
 
         Parameters
         ----------
@@ -161,14 +161,14 @@ class SplitterPlate:
         return Surface(mesh, kind, name, front=front, back=back)
 
     def offsets(self) -> tuple[float, float]:
-        """Where light along +x comes in (z) to hit the coating in the origin, and then goes down (x).
+        """Displacements of light along +x that hits the coating in the origin: in z before, in x after.
 
         Returns
         -------
         z, x : float, metres
         """
         normal = _turn()[:, 2]
-        inside = refracted(np.array([1.0, 0.0, 0.0]), normal, 1.0, real_index(self.glass, self.design))
+        inside = refract(np.array([1.0, 0.0, 0.0]), normal, 1.0, real_index(self.glass, self.design))
         down = inside - 2.0 * (inside @ normal) * normal
         enters = -inside * (self.thickness / (inside @ normal))
         leaves = down * (self.thickness / -(down @ normal))

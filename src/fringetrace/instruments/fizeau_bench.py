@@ -1,4 +1,4 @@
-"""The Fizeau interferometer: light goes to and fro between a reference face and the sample."""
+"""Fizeau interferometer: multiple round trips between a reference face and the sample."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from fringetrace.core import FloatArray, nm, rotation
 from fringetrace.geometry import Mesh, Sphere, height_map, plate
 from fringetrace.instruments import layout
-from fringetrace.instruments.arms import Mark
-from fringetrace.instruments.interferometer import Bench
+from fringetrace.instruments.arms import Arms, Mark
+from fringetrace.instruments.interferometer import Interferometer
 from fringetrace.optics import BeamSplitter, Dielectric, Film, Interface, Material, Mirror, as_material
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
 
@@ -45,8 +45,8 @@ def fizeau(
     min_amplitude: float = 1e-6,
     method: str = "auto",
     design: float = DESIGN,
-) -> Bench:
-    """A Fizeau interferometer: a glass plate over the sample, its lower face the reference.
+) -> Interferometer:
+    """Fizeau interferometer: a glass plate above the sample, its lower face the reference.
 
     Light comes down through the plate; what the reference face sends back interferes with what comes back
     from the sample, once or after several round trips in the gap: Airy's fringes, as narrow as both
@@ -91,7 +91,7 @@ def fizeau(
 
     Returns
     -------
-    Bench
+    Interferometer
         A phase step moves the reference face: light with m round trips is turned by -m delta. Heights
         by phase steps hold where one round trip is all that counts.
 
@@ -103,7 +103,7 @@ def fizeau(
     TypeError
         If the sample is no mesh.
     """
-    size = layout.checked_image("fizeau", aperture, pixels, rays)
+    size = layout.checked_image_size("fizeau", aperture, pixels, rays)
     surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
     layout.checked_tilt("fizeau", reference_tilt)
     layout.checked_tilt("fizeau", wedge)
@@ -124,15 +124,13 @@ def fizeau(
     )
     beam = Beam(
         centre=-arm * x, direction=x, up=y, size=size, shape=layout.ray_grid(pixels, rays),
-        profile=layout.seen(profile),
+        profile=layout.flip_profile(profile),
     )  # fmt: skip
     outside, inside, filled = (layout.real_index(m, design) for m in (around, glass, between))
     focus = 2.0 * arm - top + gap * outside / filled + (top - gap) * outside / inside
     ccd = CCD(centre=arm * z, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels, focus=focus)
-    return Bench(
-        scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, mark=Mark(2, then=1, sense=-1),
-        sample=1, immersion=as_material(between), max_bounces=max_bounces, min_amplitude=min_amplitude,
-    )  # fmt: skip
+    arms = Arms(Mark(2, then=1, sense=-1), reference_tilt, sample=1, immersion=as_material(between))
+    return Interferometer(scene, beam, ccd, arms, method, max_bounces, min_amplitude)
 
 
 def _checked_top(height: float, gap: float, thickness: float | None) -> float:
@@ -164,17 +162,21 @@ def _plate(
     coatings: tuple[Film | None, Film | None],
 ) -> tuple[Surface, ...]:
     """The reference face, its front in the glass, and the upper face if there is one."""
-    face = _face(size, radius).moved(turn=layout.standing(layout.leaning(tilt))).moved((0.0, 0.0, gap))
+    face = (
+        _face(size, radius)
+        .moved(turn=layout.standing_rotation(layout.tilted_normal(tilt)))
+        .moved((0.0, 0.0, gap))
+    )
     inside, filled = as_material(glass), as_material(between)
     form = None
     if math.isfinite(radius):
-        centre = np.array([0.0, 0.0, gap]) + radius * layout.leaning(tilt)
+        centre = np.array([0.0, 0.0, gap]) + radius * layout.tilted_normal(tilt)
         form = Sphere(centre, abs(radius))
     reference = Surface(face, Dielectric(film=coatings[0]), "reference", form, inside, filled)
     if thickness is None:
         return (reference,)
     wide = 4.0 * max(size)
-    upper = plate(wide, wide).moved(turn=layout.standing(layout.leaning(wedge)))
+    upper = plate(wide, wide).moved(turn=layout.standing_rotation(layout.tilted_normal(wedge)))
     return reference, Surface(
         upper.moved((0.0, 0.0, gap + thickness)),
         Dielectric(film=coatings[1]),

@@ -1,4 +1,4 @@
-"""The Jamin-Lebedeff interferometer: crystal plates part the light into two beams, and join them again."""
+"""Jamin-Lebedeff interferometer: birefringent plates separate two beams and recombine them."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import numpy as np
 from fringetrace.core import FloatArray, nm, unit
 from fringetrace.geometry import plate
 from fringetrace.instruments import layout
-from fringetrace.instruments.arms import Mark
-from fringetrace.instruments.interferometer import Bench
+from fringetrace.instruments.arms import Arms, Mark
+from fringetrace.instruments.interferometer import Interferometer
 from fringetrace.instruments.layout import Sample
-from fringetrace.optics import Element, Index, Material, Meeting, Polariser, ShearPlate, wave_plate
+from fringetrace.optics import Element, IncidentRays, Material, Polariser, RealIndex, ShearPlate, wave_plate
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
 
 # Calcite at 589.3 nm, ordinary and extraordinary.
@@ -21,7 +21,7 @@ SODIUM = 589.3 * nm
 # Of the polariser, the half-wave plate, the quarter-wave plate.
 HALFWAY = math.pi / 4.0
 # Slope of the rays that tell how deep a plate seems.
-TILT = 1e-4
+PROBE_SLOPE = 1e-4
 
 
 def jamin_lebedeff(
@@ -33,7 +33,7 @@ def jamin_lebedeff(
     analyser: float = HALFWAY,
     senarmont: bool = False,
     shear: float | None = None,
-    crystal: tuple[Index, Index] = CALCITE,
+    crystal: tuple[RealIndex, RealIndex] = CALCITE,
     half_wave: float | None = None,
     na: float | None = None,
     plane: float = 0.0,
@@ -42,8 +42,8 @@ def jamin_lebedeff(
     profile: Profile | None = None,
     method: str = "auto",
     design: float = SODIUM,
-) -> Bench:
-    """A Jamin-Lebedeff interferometer: polarised, both beams through the same plates side by side.
+) -> Interferometer:
+    """Jamin-Lebedeff interferometer: two polarised beams side by side through the same plates.
 
     Light along +z, polarised at 45 degrees, meets a shear plate, a half-wave plate (which swaps the two
     polarisations), the sample, a second shear plate like the first, the analyser. The ordinary beam goes
@@ -78,7 +78,7 @@ def jamin_lebedeff(
 
     Returns
     -------
-    Bench
+    Interferometer
         `path_difference` has the optical path that the sample adds.
 
     Raises
@@ -89,14 +89,14 @@ def jamin_lebedeff(
     TypeError
         If the sample is no mesh.
     """
-    size = layout.checked_image("jamin_lebedeff", aperture, pixels, rays)
-    surfaces = layout.transparent("jamin_lebedeff", sample, index)
-    aside, deep = layout.extent(surfaces, max(size))
+    size = layout.checked_image_size("jamin_lebedeff", aperture, pixels, rays)
+    surfaces = layout.transmitting_surfaces("jamin_lebedeff", sample, index)
+    aside, deep = layout.sample_extent(surfaces, max(size))
     least = max(float(np.abs([s.mesh.bounds[:, 0] for s in surfaces]).max()) + 0.5 * aperture, aperture)
     shear = 1.25 * least if shear is None else shear
     if not shear >= least:
         raise ValueError(f"jamin_lebedeff shear: expected at least {least:g} m, got {shear!r}")
-    space = Scene(surfaces, layout.surrounding(medium))
+    space = Scene(surfaces, layout.surrounding_medium(medium))
     stop = 1.1 * max(deep, abs(plane)) + 0.25 * max(size)
     plates, moved, depth = _plates(shear, crystal, layout.real_index(space.around, design), design)
     half = wave_plate((1.0, 1.0, 0.0), 0.5, half_wave)
@@ -117,15 +117,13 @@ def jamin_lebedeff(
     _, y, z = np.eye(3)
     beam = Beam(
         centre=-4.0 * stop * z, direction=z, up=y, size=size, shape=layout.ray_grid(pixels, rays),
-        profile=layout.seen(profile), polarisation=np.array([-math.cos(HALFWAY), math.sin(HALFWAY)]),
+        profile=layout.flip_profile(profile), polarisation=np.array([-math.cos(HALFWAY), math.sin(HALFWAY)]),
     )  # fmt: skip
     ccd = CCD(
         centre=6.0 * stop * z + moved, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels,
         focus=6.0 * stop + depth - plane,
     )  # fmt: skip
-    return Bench(
-        scene, beam, ccd, reference=0, method=method, mark=Mark(0, branch=2), immersion=scene.medium
-    )  # fmt: skip
+    return Interferometer(scene, beam, ccd, Arms(Mark(0, branch=2), immersion=scene.medium), method)
 
 
 def _in_line(train: dict[str, tuple[float, Element]], stop: float, wide: float) -> tuple[Surface, ...]:
@@ -137,7 +135,7 @@ def _in_line(train: dict[str, tuple[float, Element]], stop: float, wide: float) 
 
 
 def _plates(
-    shear: float, crystal: tuple[Index, Index], index: float, wavelength: float
+    shear: float, crystal: tuple[RealIndex, RealIndex], index: float, wavelength: float
 ) -> tuple[ShearPlate, FloatArray, float]:
     """A plate that displaces the extraordinary beam by so much; its displacement (3,); how deep it seems.
 
@@ -145,10 +143,10 @@ def _plates(
     both planes, whose depths differ in a crystal.
     """
     axis = np.array([1.0, 0.0, 1.0])
-    slopes = TILT * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
+    slopes = PROBE_SLOPE * np.array([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)])
     direction = unit(np.column_stack([slopes, np.ones(len(slopes))]))
     none = np.zeros((len(slopes), 3))
-    rays = Meeting(
+    rays = IncidentRays(
         point=none, direction=direction, normal=none + np.array([0.0, 0.0, 1.0]),
         index=np.full(len(slopes), index), field=none + np.array([1.0 + 0j, 0.0, 0.0]), wavelength=wavelength,
     )  # fmt: skip
@@ -158,5 +156,5 @@ def _plates(
     if not size > 0.0:
         raise ValueError(f"jamin_lebedeff crystal: expected two different indices, got {crystal!r}")
     thickness = shear / size
-    depth = 0.5 * (point[1, 0] - point[2, 0] + point[3, 1] - point[4, 1]) / (2.0 * TILT)
+    depth = 0.5 * (point[1, 0] - point[2, 0] + point[3, 1] - point[4, 1]) / (2.0 * PROBE_SLOPE)
     return ShearPlate(axis, thickness, *crystal), point[0] * thickness, float(depth * thickness)

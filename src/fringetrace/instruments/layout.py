@@ -1,4 +1,4 @@
-"""What benches have in common: checked numbers, rays and pixels, turned plates, transparent samples."""
+"""Layout of interferometers: checked sizes, ray grids, tilted plates, transparent samples."""
 
 from __future__ import annotations
 
@@ -24,8 +24,10 @@ STEEP = STEEPEST / math.hypot(1.0, STEEPEST)
 Sample = Mesh | Surface | Iterable[Surface]
 
 
-def checked_image(bench: str, aperture: float, pixels: tuple[int, int], rays: float) -> tuple[float, float]:
-    """Width and height of an image, once numbers are known to be good.
+def checked_image_size(
+    bench: str, aperture: float, pixels: tuple[int, int], rays: float
+) -> tuple[float, float]:
+    """Checked width and height of an image, metres.
 
     Parameters
     ----------
@@ -54,19 +56,19 @@ def checked_image(bench: str, aperture: float, pixels: tuple[int, int], rays: fl
 
 
 def checked_tilt(bench: str, tilt: tuple[float, float]) -> None:
-    """Refuse a tilt that would lead the reference beam off a bench, with a ValueError."""
+    """Check that a tilt keeps the reference beam on the instrument; else ValueError."""
     if not math.hypot(*tilt) <= TILT:
         raise ValueError(f"{bench} reference_tilt: expected up to {TILT} rad, got {tilt!r}")
 
 
 def ray_grid(pixels: tuple[int, int], rays: float) -> tuple[int, int]:
-    """Rows and columns of a beam's rays, for so many rays a pixel."""
+    """Rows and columns of a beam's rays, for a number of rays per pixel."""
     least = 1 if rays >= 1 else LEAST
     return max(least, round(pixels[0] * rays)), max(least, round(pixels[1] * rays))
 
 
-def seen(profile: Profile | None) -> Profile | None:
-    """A profile over the image as one over a beam whose columns run along -x."""
+def flip_profile(profile: Profile | None) -> Profile | None:
+    """Profile over the image as one over a beam whose columns run along -x."""
     return None if profile is None else partial(_mirrored, profile)
 
 
@@ -74,29 +76,29 @@ def _mirrored(profile: Profile, x: FloatArray, y: FloatArray) -> FloatArray:
     return profile(-x, y)
 
 
-def standing(normal: FloatArray) -> FloatArray:
-    """Turn (3, 3) of a plate from facing +z to a normal in any direction but y, its rows still along y."""
+def standing_rotation(normal: FloatArray) -> FloatArray:
+    """Rotation (3, 3) of a plate from +z to a normal in any direction but y, its rows still along y."""
     n = unit(np.asarray(normal, dtype=np.float64)[None])[0]
     side = unit(np.cross([0.0, 1.0, 0.0], n)[None])[0]
     return np.stack([side, np.cross(n, side), n], axis=1)
 
 
-def leaning(tilt: tuple[float, float]) -> FloatArray:
-    """Normal of a mirror that faced +z, tilted: path_slope of its light is along the tilt."""
+def tilted_normal(tilt: tuple[float, float]) -> FloatArray:
+    """Normal of a tilted mirror that faced +z; `path_slope` of its light is along the tilt."""
     angle = math.hypot(*tilt)
     scale = math.sin(angle) / angle if angle > 0.0 else 1.0
     return np.array([scale * tilt[0], scale * tilt[1], math.cos(angle)])
 
 
-def surrounding(medium: Material | complex | str | None) -> Material | None:
-    """The medium around a bench, from what stands for one; None: a vacuum."""
+def surrounding_medium(medium: Material | complex | str | None) -> Material | None:
+    """Medium around an interferometer, from a material, name or index; None: vacuum."""
     from fringetrace.optics import as_material
 
     return None if medium is None else as_material(medium, "medium")
 
 
-def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...]:
-    """The surfaces of a sample that light goes through.
+def transmitting_surfaces(bench: str, sample: Sample, index: object) -> tuple[Surface, ...]:
+    """Surfaces of a transparent sample.
 
     Parameters
     ----------
@@ -131,15 +133,15 @@ def transparent(bench: str, sample: Sample, index: object) -> tuple[Surface, ...
     return (Surface(mesh, Dielectric("transmitted"), "sample", back=index),)  # type: ignore[arg-type]
 
 
-def extent(surfaces: Iterable[Surface], aperture: float) -> tuple[float, float]:
-    """How far a sample reaches from the axis (the image at least), and from z = 0 to either side, metres."""
+def sample_extent(surfaces: Iterable[Surface], aperture: float) -> tuple[float, float]:
+    """Extent of a sample from the axis (at least the image), and from z = 0 to either side, metres."""
     bounds = np.array([surface.mesh.bounds for surface in surfaces])
     aside = float(np.abs(bounds[:, :, :2]).max())
     return max(aside, 0.5 * math.sqrt(2.0) * aperture), float(np.abs(bounds[:, :, 2]).max())
 
 
 def pupil(bench: str, scene: Scene, aperture: float | None, wavelength: float = 0.0) -> Pupil:
-    """What takes away the rays outside of a numerical aperture; None: those too steep for a bench.
+    """Pupil that limits rays to a numerical aperture; None: to those that fit the instrument.
 
     Parameters
     ----------
@@ -167,7 +169,7 @@ def pupil(bench: str, scene: Scene, aperture: float | None, wavelength: float = 
 
 
 def real_index(material: object, wavelength: float) -> float:
-    """Real index of a material, or of what stands for one, at a wavelength (any, if it does not disperse)."""
+    """Real index of a material, name or index, at a wavelength (any, if it is not dispersive)."""
     from fringetrace.optics import as_material
 
     medium = as_material(material)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Lenses from catalogue data: radii, thicknesses and glasses become surfaces with forms, closed by edges.
+"""Lenses from catalogue data: radii, thicknesses and glasses to surfaces with exact forms and edges.
 
 Signs are those of catalogues. Light comes along the axis; a radius is positive where the centre of
 curvature lies beyond the vertex, so that a biconvex lens has (+, -); a plane has an infinite one.
@@ -52,7 +52,7 @@ def lens(
     rings: int | None = None,
     name: str = "lens",
 ) -> tuple[Surface, ...]:
-    """Surfaces of a singlet, a cemented doublet or triplet, or a row of them with air between.
+    """Surfaces of a lens: singlet, cemented doublet or triplet, or several with air gaps.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def lens(
 def plano_convex(
     radius: float, thickness: float, glass: Glass, diameter: float, *, flat_first: bool = False, **more: Any
 ) -> tuple[Surface, ...]:
-    """A plano-convex lens; see `lens`.
+    """Surfaces of a plano-convex lens; see `lens`.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def plano_convex(
 def biconvex(
     radius: float, thickness: float, glass: Glass, diameter: float, **more: Any
 ) -> tuple[Surface, ...]:
-    """A symmetric lens; see `lens`.
+    """Surfaces of a symmetric biconvex lens; see `lens`.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def biconvex(
 def plano_hyperbola(
     focal_length: float, index: float, thickness: float, glass: Glass, diameter: float, **more: Any
 ) -> tuple[Surface, ...]:
-    """The plano-convex lens that has one path length for all light along its axis (Descartes 1637).
+    """Surfaces of a plano-hyperbolic lens, of equal optical path along its axis (Descartes 1637).
 
     The flat face comes first; behind it stands a hyperboloid of conic constant -n^2 and vertex radius
     (n - 1) f, whose far focus, `focal_length` behind the vertex, all light meets in step.
@@ -215,7 +215,7 @@ def ball(
     interface: Boundary = Dielectric(),  # noqa: B008 - frozen
     name: str = "ball",
 ) -> Surface:
-    """A ball lens.
+    """Surfaces of a ball lens.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def ball(
 def focal_lengths(
     radii: Sequence[float], thicknesses: Sequence[float], indices: Sequence[float]
 ) -> tuple[float, float]:
-    """Focal length, and from the last vertex to the focus, of rays near the axis (Gauss 1841).
+    """Focal length and back focal length of paraxial rays (Gauss 1841).
 
     Parameters
     ----------

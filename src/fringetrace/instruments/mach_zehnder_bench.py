@@ -1,4 +1,4 @@
-"""The Mach-Zehnder interferometer: one arm goes through the sample, once."""
+"""Mach-Zehnder interferometer: one arm passes the sample once."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from fringetrace.core import FloatArray, nm
 from fringetrace.geometry import plate
 from fringetrace.instruments import layout
-from fringetrace.instruments.arms import path_slope
-from fringetrace.instruments.interferometer import Bench
+from fringetrace.instruments.arms import Arms, Mark, path_slope
+from fringetrace.instruments.interferometer import Interferometer
 from fringetrace.instruments.layout import Sample
 from fringetrace.optics import BeamSplitter, Interface, Material, Mirror
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
@@ -37,8 +37,8 @@ def mach_zehnder(
     mirror: Interface = Mirror(),  # noqa: B008 - frozen
     method: str = "auto",
     design: float = DESIGN,
-) -> Bench:
-    """A Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
+) -> Interferometer:
+    """Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
 
     Light goes through the sample along +z; the camera looks back at it, its columns along x and its rows
     along y, focused on a plane inside of the sample: rays are carried back to it along the lines on which
@@ -79,7 +79,7 @@ def mach_zehnder(
 
     Returns
     -------
-    Bench
+    Interferometer
         `path_difference` has the optical path that the sample adds.
 
     Raises
@@ -90,17 +90,17 @@ def mach_zehnder(
     TypeError
         If the sample is no mesh.
     """
-    size = layout.checked_image("mach_zehnder", aperture, pixels, rays)
+    size = layout.checked_image_size("mach_zehnder", aperture, pixels, rays)
     layout.checked_tilt("mach_zehnder", reference_tilt)
-    around = layout.surrounding(medium)
-    surfaces = layout.transparent("mach_zehnder", sample, index)
-    aside, deep = layout.extent(surfaces, max(size))
+    around = layout.surrounding_medium(medium)
+    surfaces = layout.transmitting_surfaces("mach_zehnder", sample, index)
+    aside, deep = layout.sample_extent(surfaces, max(size))
     stop = 1.1 * max(deep, abs(plane)) + 0.25 * max(size)
     arm = 4.0 * max(stop, aside)
     chip = 7.0 * (arm + aside)
     small = plate(4.0 * aside, 4.0 * aside)
     pupil = layout.pupil("mach_zehnder", Scene(surfaces, around), na, design)
-    turn = layout.standing(DIAGONAL)
+    turn = layout.standing_rotation(DIAGONAL)
     scene = Scene(
         (
             Surface(small.moved((-arm, 0.0, -arm), turn), splitter, "first splitter"),
@@ -115,15 +115,14 @@ def mach_zehnder(
     x, y, z = np.eye(3)
     beam = Beam(
         centre=-arm * x - 2.0 * arm * z, direction=z, up=y,
-        size=size, shape=layout.ray_grid(pixels, rays), profile=layout.seen(profile),
+        size=size, shape=layout.ray_grid(pixels, rays), profile=layout.flip_profile(profile),
         polarisation=None if polarisation is None else np.array([-polarisation[0], polarisation[1]]),
     )  # fmt: skip
     ccd = CCD(
         centre=chip * z, normal=-z, up=y, pitch=aperture / pixels[1], shape=pixels, focus=chip - plane,
     )  # fmt: skip
-    return Bench(
-        scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, immersion=scene.medium, sample=1
-    )
+    arms = Arms(Mark(2), reference_tilt, sample=1, immersion=scene.medium)
+    return Interferometer(scene, beam, ccd, arms, method)
 
 
 def _turn(tilt: tuple[float, float]) -> FloatArray:
@@ -134,7 +133,7 @@ def _turn(tilt: tuple[float, float]) -> FloatArray:
     slope_x, slope_y = path_slope(tilt)
     ahead = math.sqrt(1.0 - slope_x**2 - slope_y**2)
     # the second splitter swaps x and z
-    return layout.standing(np.array([0.0, 0.0, 1.0]) - np.array([ahead, slope_y, slope_x]))
+    return layout.standing_rotation(np.array([0.0, 0.0, 1.0]) - np.array([ahead, slope_y, slope_x]))
 
 
 def _last(arm: float, aside: float, splitter: Interface) -> Surface:
@@ -149,5 +148,7 @@ def _last(arm: float, aside: float, splitter: Interface) -> Surface:
     across = 2.0 * (1.5 * (arm + aside) + aside)
     mesh = plate(math.sqrt(2.0) * (high - low), across)
     return Surface(
-        mesh.moved((middle - arm, 0.0, middle), layout.standing(DIAGONAL)), splitter, "second splitter"
+        mesh.moved((middle - arm, 0.0, middle), layout.standing_rotation(DIAGONAL)),
+        splitter,
+        "second splitter",
     )

@@ -1,4 +1,4 @@
-"""Ready benches: the Michelson, and the others by name."""
+"""Michelson (Twyman-Green) interferometer."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import numpy as np
 from fringetrace.core import FloatArray, rotation
 from fringetrace.geometry import Mesh, plate
 from fringetrace.instruments import layout
+from fringetrace.instruments.arms import Arms, Mark
 from fringetrace.instruments.beam_splitters import SplitterPlate, anti_reflecting, semi_reflecting
 from fringetrace.instruments.fizeau_bench import fizeau
-from fringetrace.instruments.interferometer import Bench
+from fringetrace.instruments.interferometer import Interferometer
 from fringetrace.instruments.jamin_lebedeff_bench import jamin_lebedeff
 from fringetrace.instruments.layout import TILT
 from fringetrace.instruments.mach_zehnder_bench import mach_zehnder
@@ -19,7 +20,7 @@ from fringetrace.optics import BeamSplitter, Interface, Mirror
 from fringetrace.scene import CCD, Beam, Profile, Scene, Surface
 
 __all__ = [
-    "TILT", "Bench", "SplitterPlate", "anti_reflecting", "fizeau", "jamin_lebedeff", "mach_zehnder",
+    "TILT", "Interferometer", "SplitterPlate", "anti_reflecting", "fizeau", "jamin_lebedeff", "mach_zehnder",
     "michelson", "semi_reflecting",
 ]  # fmt: skip
 
@@ -53,8 +54,8 @@ def michelson(
     mirror: Interface = Mirror(),  # noqa: B008 - frozen
     focus: bool = True,
     method: str = "auto",
-) -> Bench:
-    """A Michelson (Twyman-Green) interferometer with the sample in one arm.
+) -> Interferometer:
+    """Michelson (Twyman-Green) interferometer with the sample in one arm.
 
     The splitter stands at the origin at 45 degrees. The source at (-arm, 0, 0) fires along +x;
     half of the light goes down to the sample at (0, 0, -arm), half on to the reference mirror
@@ -94,7 +95,7 @@ def michelson(
 
     Returns
     -------
-    Bench
+    Interferometer
 
     Raises
     ------
@@ -107,7 +108,7 @@ def michelson(
     """
     surface = sample if isinstance(sample, Surface) else Surface(sample, Mirror(), "sample")
     thick = splitter if isinstance(splitter, SplitterPlate) else None
-    size = layout.checked_image("michelson", aperture, pixels, rays)
+    size = layout.checked_image_size("michelson", aperture, pixels, rays)
     arm = _arm(size, arm, float(surface.mesh.bounds[1, 2]), thick)
     _check_reference(reference_tilt, piston, arm)
     if compensator and thick is None:
@@ -135,13 +136,13 @@ def michelson(
     )
     beam = Beam(
         centre=rise * z - arm * x, direction=x, up=y, size=size, shape=layout.ray_grid(pixels, rays),
-        profile=layout.seen(profile),
+        profile=layout.flip_profile(profile),
     )  # fmt: skip
     ccd = CCD(
         centre=arm * z, normal=-z, up=y, pitch=aperture / columns, shape=(rows, columns),
         focus=2.0 * arm if focus else 0.0,
     )  # fmt: skip
-    return Bench(scene, beam, ccd, reference=2, tilt=reference_tilt, method=method, sample=1)
+    return Interferometer(scene, beam, ccd, Arms(Mark(2), reference_tilt, sample=1), method)
 
 
 def _arm(size: tuple[float, float], arm: float | None, top: float, thick: SplitterPlate | None) -> float:

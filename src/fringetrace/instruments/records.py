@@ -1,4 +1,4 @@
-"""What a CCD recorded, labelled: coordinates in metres, units, wavelength, and which way is up."""
+"""Recorded images as labelled datasets: coordinates in metres, units, wavelength, orientation."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import Array, tables
+from fringetrace.core import Array, filled, tables
 from fringetrace.scene import pixel_centres
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ NOTES: dict[str, dict[str, str]] = {
 
 
 def coordinates(shape: tuple[int, int], pitch: float) -> dict[str, Any]:
-    """Where pixels are, for xarray.
+    """Pixel coordinates for xarray.
 
     Parameters
     ----------
@@ -53,10 +53,16 @@ def coordinates(shape: tuple[int, int], pitch: float) -> dict[str, Any]:
     }
 
 
+def _without_mask(values: Any) -> Array:
+    """An array, of a type that knows NaN where there was a mask."""
+    masked = np.ma.is_masked(values)
+    return filled(values, np.result_type(values, np.float64)) if masked else np.asarray(values)
+
+
 def dataset(
-    images: Mapping[str, Any], pitch: float, axes: tables.Axes | None = None, **attributes: Any
+    images: Mapping[str, Any], pitch: float, axes: tables.Coordinates | None = None, **attributes: Any
 ) -> Dataset:
-    """Images of one CCD as a labelled dataset: interferograms, fields, phase and height maps.
+    """Labelled dataset of images of one CCD: interferograms, fields, phase and height maps.
 
     Parameters
     ----------
@@ -83,7 +89,7 @@ def dataset(
     named: dict[str, tuple[tuple[str, ...], Array, dict[str, str]]] = {}
     for name, given in images.items():
         leading, values = given if isinstance(given, tuple) else ((), given)
-        named[name] = ((*leading, *IMAGE), np.asarray(values), NOTES.get(name, {}))
+        named[name] = ((*leading, *IMAGE), _without_mask(values), NOTES.get(name, {}))
     shapes = {values.shape[-2:] for _, values, _ in named.values()}
     if len(shapes) != 1 or any(values.ndim != len(dims) for dims, values, _ in named.values()):
         found = ", ".join(f"{name} {values.shape}" for name, (_, values, _) in named.items())
@@ -93,4 +99,4 @@ def dataset(
     further = {name: (name, values, {"units": unit}) for name, (values, unit) in (axes or {}).items()}
     about = {**attributes, "pixel_pitch_m": pitch, "convention": CONVENTION}
     (shape,) = shapes
-    return tables.dataset(named, {**further, **coordinates(shape, pitch)}, about)
+    return tables.labelled_dataset(named, {**further, **coordinates(shape, pitch)}, about)

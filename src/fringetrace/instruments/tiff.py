@@ -1,4 +1,4 @@
-"""Frames of a camera as 16-bit TIFF files, with what one count is worth, in and out."""
+"""Camera frames as 16-bit TIFF files with the value of one count: writing and reading."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, checked_length, tables, whole
+from fringetrace.core import Array, FloatArray, checked_length, filled, tables, whole
 from fringetrace.instruments import records
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ LEADING = ("set", "frame")
 
 
 def counts(images: FloatArray, full_scale: float) -> Array:
-    """Irradiance as a 16-bit camera counts it, top row first.
+    """Irradiance in 16-bit camera counts, top row first.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ def save(
     full_scale: float | None = None,
     **notes: Any,
 ) -> None:
-    """Write irradiances as a 16-bit TIFF file; it is there in full or not at all.
+    """Save irradiances as a 16-bit TIFF file, atomically.
 
     Parameters
     ----------
     images : ([[set,] frame,] rows, columns) array-like
-        |E|^2; row 0 is the bottom one, which a picture file has last.
+        |E|^2; row 0 is the bottom one, which a picture file has last. Below 0, as noise may be, counts 0.
     pitch : float, metres
         Side of a pixel, which becomes the resolution of the file.
     path : path-like
@@ -66,13 +66,20 @@ def save(
     Raises
     ------
     ValueError
-        If the array has fewer than 2 axes or more than 4, or the full scale is not positive.
+        If the array has fewer than 2 axes or more than 4, a pixel is NaN, infinite or masked, or the full
+        scale is not positive.
     """
     import tifffile
 
-    values, pitch = np.asarray(images, dtype=np.float64), checked_length(pitch, "pitch")
+    values, pitch = filled(images), checked_length(pitch, "pitch")
     if not 2 <= values.ndim <= 2 + len(LEADING) or values.size == 0:
         raise ValueError(f"frames: expected shape ([[sets,] frames,] rows, columns), got {values.shape}")
+    unknown = int(np.count_nonzero(~np.isfinite(values)))
+    if unknown:
+        raise ValueError(
+            f"frames: expected finite irradiances, got NaN, infinity or a mask at "
+            f"{unknown:,} of {values.size:,} pixels; fill them first, such as by numpy.nan_to_num"
+        )
     scale = max(1.0, float(values.max())) if full_scale is None else float(full_scale)
     if not (np.isfinite(scale) and scale > 0.0):
         raise ValueError(f"full scale: expected a positive irradiance, got {scale:g}")
@@ -94,7 +101,7 @@ def save(
 
 
 def load(path: str | os.PathLike[str]) -> DataArray:
-    """Irradiances from a TIFF file that `save` or the command wrote.
+    """Load irradiances from a TIFF file that `save` or the command wrote.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What matter and surfaces do to a plane wave: materials, films, interfaces and thin elements."""
+"""Materials, thin films, interfaces and thin elements: what each does to a plane wave."""
 
 import lazy_loader
 

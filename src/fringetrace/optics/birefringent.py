@@ -1,4 +1,4 @@
-"""Plates of uniaxial crystal that split light into two polarised beams: displaced, or deflected.
+"""Birefringent plates: beam displacers (shear, Savart) and Wollaston prisms of uniaxial crystal.
 
 Inside, wave vector and ray differ: phases are those of the wave vector k, places those of the ray S. A plate
 is drawn without its thickness: rays leave, shifted, from the plane in which they arrive, and the optical
@@ -14,32 +14,31 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_direction, checked_vector
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_direction, checked_vector, dot
 from fringetrace.optics.elements import (
     Branch,
-    Index,
-    Meeting,
+    IncidentRays,
+    RealIndex,
     Waves,
-    across,
-    carried,
     checked_index,
-    checked_length,
     checked_number,
-    dot,
     index_at,
-    lying,
+    move_point,
+    positive_length,
+    rotate_fields,
+    rotate_vector,
     scaled,
-    shifted,
-    turned,
+    tangential,
+    tangential_axis,
+    transverse_axis,
     vectors_of,
-    within,
 )
 
 
-def refracted(
+def refract_extraordinary(
     wave: FloatArray, normal: FloatArray, ordinary: Array, extraordinary: Array, axis: FloatArray
 ) -> tuple[FloatArray, FloatArray, Array]:
-    """The extraordinary wave behind a face, k.eps.k = n_o^2 n_e^2 with k along the face as before it.
+    """Refraction into a uniaxial crystal: extraordinary wave with k.eps.k = n_o^2 n_e^2.
 
     With both indices equal it is the ordinary wave, k.k = n^2.
 
@@ -64,7 +63,7 @@ def refracted(
     """
     o2, e2 = ordinary**2, extraordinary**2
     excess = e2 - o2
-    along = within(wave, normal)
+    along = tangential(wave, normal)
     tilt, slant = dot(axis, normal), dot(axis, along)
     a = o2 + excess * tilt**2
     b = excess * tilt * slant
@@ -75,17 +74,17 @@ def refracted(
     return inside, scaled(inside, o2) + scaled(axis, excess * dot(axis, inside)), possible
 
 
-def split(meeting: Meeting, axis: FloatArray, what: str) -> tuple[ComplexArray, ComplexArray]:
-    """Fields along an axis, (3,) or (n, 3), and the rest of them: (n, 3) complex128 each."""
+def split_field(meeting: IncidentRays, axis: FloatArray, what: str) -> tuple[ComplexArray, ComplexArray]:
+    """Field components along an axis, (3,) or (n, 3), and the remainder: (n, 3) complex128 each."""
     field = vectors_of(meeting, what)
-    seen = across(axis, meeting.direction)
+    seen = transverse_axis(axis, meeting.direction)
     along = scaled(seen, dot(field, seen))
     return along, np.asarray(field - along)
 
 
 @dataclass(frozen=True, eq=False)
 class ShearPlate:
-    """A plane-parallel plate of uniaxial crystal, a beam displacer: two beams leave it side by side.
+    """Shear plate (beam displacer) of uniaxial crystal: two polarised beams leave it side by side.
 
     The first branch is the ordinary beam, polarised across the optic axis, the second the extraordinary one.
     At normal incidence the ordinary beam goes straight on with the path n_o d, and the extraordinary one is
@@ -108,8 +107,8 @@ class ShearPlate:
 
     axis: FloatArray
     thickness: float
-    ordinary: Index
-    extraordinary: Index
+    ordinary: RealIndex
+    extraordinary: RealIndex
 
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
@@ -117,7 +116,7 @@ class ShearPlate:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "ShearPlate axis"))
-        checked_length(self.thickness, "ShearPlate thickness")
+        positive_length(self.thickness, "ShearPlate thickness")
         checked_index(self.ordinary, "ShearPlate ordinary index")
         checked_index(self.extraordinary, "ShearPlate extraordinary index")
 
@@ -126,36 +125,40 @@ class ShearPlate:
         """Whether an index depends on the wavelength."""
         return callable(self.ordinary) or callable(self.extraordinary)
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The ordinary and the extraordinary beam; see `Element`."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Ordinary and extraordinary branch; see `Element`."""
         n_o = index_at(self.ordinary, meeting.wavelength, "ShearPlate")
         n_e = index_at(self.extraordinary, meeting.wavelength, "ShearPlate")
-        extraordinary, ordinary = split(meeting, self.axis, "ShearPlate")
+        extraordinary, ordinary = split_field(meeting, self.axis, "ShearPlate")
         return self._beam(meeting, ordinary, n_o, n_o), self._beam(meeting, extraordinary, n_o, n_e)
 
-    def _beam(self, meeting: Meeting, field: ComplexArray, n_o: float, n_e: float) -> Branch:
+    def _beam(self, meeting: IncidentRays, field: ComplexArray, n_o: float, n_e: float) -> Branch:
         """One of the beams, through the plate."""
         facing = dot(meeting.direction, meeting.normal)
         ahead = scaled(meeting.normal, np.where(facing > 0.0, 1.0, -1.0))
         axis = np.broadcast_to(self.axis, ahead.shape)
         first, second = (np.full(len(ahead), n) for n in (n_o, n_e))
         arriving = scaled(meeting.direction, meeting.index)
-        wave, ray, possible = refracted(arriving, ahead, first, second, axis)
+        wave, ray, possible = refract_extraordinary(arriving, ahead, first, second, axis)
         depth = dot(ray, ahead)
         ray = scaled(ray, self.thickness / np.where(possible, depth, 1.0))
         path = np.where(possible, dot(wave, ray), 0.0)
-        shift = np.where(possible[:, None], within(ray, meeting.normal), 0.0)
+        shift = np.where(possible[:, None], tangential(ray, meeting.normal), 0.0)
         return Branch(scaled(field, possible), None, meeting.point + shift, path)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> ShearPlate:
-        """The plate turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        """The plate rotated; as `Mesh.moved`."""
+        return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 def savart(
-    normal: npt.ArrayLike, first: npt.ArrayLike, thickness: float, ordinary: Index, extraordinary: Index
+    normal: npt.ArrayLike,
+    first: npt.ArrayLike,
+    thickness: float,
+    ordinary: RealIndex,
+    extraordinary: RealIndex,
 ) -> tuple[ShearPlate, ShearPlate]:
-    """The two plates of a Savart plate: optic axes at 45 degrees to the normal, in planes across each other.
+    """Savart plate: two shear plates, optic axes at 45 degrees to the normal, in perpendicular planes.
 
     Parameters
     ----------
@@ -178,7 +181,7 @@ def savart(
         If `first` is along the normal, or as for `ShearPlate`.
     """
     n = checked_direction(normal, "savart normal")
-    u = across(checked_direction(first, "savart first"), n[None])[0]
+    u = transverse_axis(checked_direction(first, "savart first"), n[None])[0]
     if not u.any():
         raise ValueError(f"savart first: expected a direction across the normal {n.tolist()}, got {first!r}")
     axes = (n + u, n + np.cross(n, u))
@@ -188,7 +191,7 @@ def savart(
 
 @dataclass(frozen=True, eq=False)
 class Wollaston:
-    """Two prisms of uniaxial crystal, their optic axes in the plane and across each other: two beams part.
+    """Wollaston prism: two crystal prisms with perpendicular optic axes; the polarisations part in angle.
 
     The prism on the front has its optic axis along `axis`, and grows thicker that way; the one behind
     has it along normal x axis. The first branch is polarised along `axis` (extraordinary in the front
@@ -219,8 +222,8 @@ class Wollaston:
     centre: FloatArray
     axis: FloatArray
     angle: float
-    ordinary: Index
-    extraordinary: Index
+    ordinary: RealIndex
+    extraordinary: RealIndex
     thickness: float = 0.0
 
     waves: ClassVar[Waves] = "plane"
@@ -242,17 +245,23 @@ class Wollaston:
         """Whether an index depends on the wavelength."""
         return callable(self.ordinary) or callable(self.extraordinary)
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The beam polarised along the axis, and the one across; see `Element`."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Branch polarised along the axis, and the one across; see `Element`."""
         n_o = index_at(self.ordinary, meeting.wavelength, "Wollaston")
         n_e = index_at(self.extraordinary, meeting.wavelength, "Wollaston")
-        slope = lying(self.axis, meeting.normal, "Wollaston axis")
-        along, rest = split(meeting, slope, "Wollaston")
+        slope = tangential_axis(self.axis, meeting.normal, "Wollaston axis")
+        along, rest = split_field(meeting, slope, "Wollaston")
         one = self._beam(meeting, along, slope, n_o, n_e, True)
         return one, self._beam(meeting, rest, slope, n_o, n_e, False)
 
     def _beam(
-        self, meeting: Meeting, field: ComplexArray, slope: FloatArray, n_o: float, n_e: float, first: bool
+        self,
+        meeting: IncidentRays,
+        field: ComplexArray,
+        slope: FloatArray,
+        n_o: float,
+        n_e: float,
+        first: bool,
     ) -> Branch:
         """One of the beams, through both prisms; it is extraordinary in the `first` or in the other."""
         inward = -meeting.normal
@@ -266,20 +275,20 @@ class Wollaston:
         lone = [np.where(front == first, *pair) for pair in ((n_e, n_o), (n_o, n_e))]
         plain = np.full(len(front), n_o)
         wave = scaled(meeting.direction, meeting.index)
-        one, ray, possible = refracted(wave, ahead, plain, lone[0], axes[0])
-        two, way, through = refracted(one, wedge, plain, lone[1], axes[1])
-        level = within(two, ahead)
+        one, ray, possible = refract_extraordinary(wave, ahead, plain, lone[0], axes[0])
+        two, way, through = refract_extraordinary(one, wedge, plain, lone[1], axes[1])
+        level = tangential(two, ahead)
         rest = meeting.index**2 - dot(level, level)
         possible &= through & (rest > 0.0)
         out = level + scaled(ahead, np.sqrt(np.where(possible, rest, 1.0)))
         out = np.where(possible[:, None], scaled(out, 1.0 / meeting.index), meeting.direction)
         place, path = self._crossed(meeting, ahead, wedge, (one, two), (ray, way), possible)
-        sent = scaled(carried(field, meeting.direction, out), possible)
+        sent = scaled(rotate_fields(field, meeting.direction, out), possible)
         return Branch(sent, out, place, path)
 
     def _crossed(
         self,
-        meeting: Meeting,
+        meeting: IncidentRays,
         ahead: FloatArray,
         wedge: FloatArray,
         waves: tuple[FloatArray, FloatArray],
@@ -288,7 +297,7 @@ class Wollaston:
     ) -> tuple[FloatArray, FloatArray]:
         """Where rays leave, brought back into the plane, and their paths through both prisms."""
         half = 0.5 * self.thickness
-        offset = within(meeting.point - self.centre, ahead)
+        offset = tangential(meeting.point - self.centre, ahead)
         place = offset - scaled(ahead, np.full(len(ahead), half))  # from the middle of both
         path = np.zeros(len(ahead))
         for wave, ray, face, height in zip(waves, rays, (wedge, ahead), (0.0, half), strict=True):
@@ -297,8 +306,10 @@ class Wollaston:
             step = np.where(usable, height - dot(place, face), 0.0) / np.where(usable, pace, 1.0)
             place = place + scaled(ray, step)
             path += step * dot(wave, ray)
-        return meeting.point + within(place - offset, ahead), path
+        return meeting.point + tangential(place - offset, ahead), path
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Wollaston:
-        """The prism turned about the origin, then shifted; as `Mesh.moved`."""
-        return replace(self, centre=shifted(self.centre, offset, turn), axis=turned(self.axis, turn))
+        """The prism rotated about the origin, then shifted; as `Mesh.moved`."""
+        return replace(
+            self, centre=move_point(self.centre, offset, turn), axis=rotate_vector(self.axis, turn)
+        )

@@ -1,4 +1,4 @@
-"""Flat elements of no thickness that a ray goes through: what they are told, and what they answer.
+"""Thin optical elements: flat, without thickness; their protocol, ideal lens and annular stop.
 
 A field here is the square root of a ray's power, so that an element is lossless where it keeps
 |field|^2; how a bundle's cross section changes is in its rays. Fields go as exp(-i w t).
@@ -22,18 +22,19 @@ from fringetrace.core import (
     checked_rotation,
     checked_vector,
     component,
+    dot,
 )
 
 # An axis nearer to a ray than its own rounding has no direction across it.
 PARALLEL = 8.0 * float(np.finfo(np.float64).eps)
 
-Index = float | Callable[[float], float]
+RealIndex = float | Callable[[float], float]
 Waves = Literal["plane", "curved", "torn"]
 
 
 @dataclass(frozen=True, eq=False)
-class Meeting:
-    """Rays that met one element.
+class IncidentRays:
+    """Rays that hit an element, one row each.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ class Meeting:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """One of the branches in which rays leave an element; None: unchanged.
+    """Branch in which rays leave an element; None: unchanged.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ class Branch:
 
 
 class Element(Protocol):
-    """Anything flat that sends rays on in a fixed number of branches.
+    """Protocol of thin elements that send rays on in a fixed number of branches.
 
     `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: plane waves
     leave it plane, curved, or torn (neighbouring rays may fare differently).
@@ -89,43 +90,43 @@ class Element(Protocol):
 
     @property
     def waves(self) -> Waves:
-        """How plane waves leave it."""
+        """Effect on plane waves: they stay plane, get curved, or are torn."""
 
     @property
     def branches(self) -> int:
-        """How many branches there are, always."""
+        """Number of branches, the same for all rays."""
 
     @property
     def polarised(self) -> bool:
-        """Whether fields have to be vectors."""
+        """Whether the element needs fields as vectors."""
 
     @property
     def chromatic(self) -> bool:
-        """Whether rays depend on the wavelength."""
+        """Whether the branches depend on the wavelength."""
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The branches, with a row for each ray."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Branches of the rays, one row per ray."""
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Element:
-        """The element turned about the origin, then shifted; as `Mesh.moved`."""
+        """The element rotated about the origin, then shifted; as `Mesh.moved`."""
 
 
-def checked_length(value: float, what: str) -> float:
-    """A positive length; ValueError if it is none."""
+def positive_length(value: float, what: str) -> float:
+    """Checked positive length in metres; else ValueError."""
     if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
         raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
     return float(value)
 
 
 def checked_number(value: float, what: str) -> float:
-    """A finite real number; ValueError if it is none."""
+    """Checked finite real number; else ValueError."""
     if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value)):
         raise ValueError(f"{what}: expected a finite number, got {value!r}")
     return float(value)
 
 
-def checked_index(value: Index, what: str) -> Index:
-    """A refractive index, or the function of the wavelength that gives it; ValueError if it is neither."""
+def checked_index(value: RealIndex, what: str) -> RealIndex:
+    """Checked refractive index, or function of the wavelength that gives it; else ValueError."""
     if callable(value):
         return value
     if isinstance(value, bool) or not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
@@ -133,52 +134,47 @@ def checked_index(value: Index, what: str) -> Index:
     return float(value)
 
 
-def index_at(index: Index, wavelength: float | None, what: str) -> float:
+def index_at(index: RealIndex, wavelength: float | None, what: str) -> float:
     """Real refractive index at a wavelength (metres)."""
-    return float(np.real(index(asked(wavelength, what)))) if callable(index) else index
+    return float(np.real(index(required_wavelength(wavelength, what)))) if callable(index) else index
 
 
-def asked(wavelength: float | None, what: str) -> float:
-    """The wavelength, in metres; ValueError if there is none."""
+def required_wavelength(wavelength: float | None, what: str) -> float:
+    """Wavelength of rays in metres; ValueError if it is missing."""
     if wavelength is None:
         raise ValueError(f"{what}: expected a wavelength, which it depends on, got None")
     return wavelength
 
 
-def vectors_of(meeting: Meeting, what: str) -> ComplexArray:
-    """The fields, (n, 3) complex128; ValueError if they are no vectors."""
+def vectors_of(meeting: IncidentRays, what: str) -> ComplexArray:
+    """Field vectors of rays, (n, 3) complex128; ValueError if the light is scalar."""
     if meeting.field.ndim != 2:
         raise ValueError(f"{what}: expected polarised light, fields (n, 3), got shape {meeting.field.shape}")
     return meeting.field
 
 
-def shifted(point: FloatArray, offset: npt.ArrayLike, turn: npt.ArrayLike | None) -> FloatArray:
-    """A point (3,) turned about the origin, then shifted."""
-    return turned(point, turn) + checked_vector(offset, "offset")
+def move_point(point: FloatArray, offset: npt.ArrayLike, turn: npt.ArrayLike | None) -> FloatArray:
+    """Point (3,) rotated about the origin, then shifted."""
+    return rotate_vector(point, turn) + checked_vector(offset, "offset")
 
 
-def turned(vector: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
-    """A vector (3,) turned about the origin."""
+def rotate_vector(vector: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
+    """Vector (3,) rotated about the origin."""
     return vector if turn is None else np.asarray(checked_rotation(turn, "turn") @ vector, dtype=np.float64)
 
 
-def dot(a: Array, b: Array) -> Array:
-    """Scalar products of rows, (n, 3) and (n, 3), without conjugation."""
-    return np.asarray(np.einsum("ij,ij->i", a, b))
-
-
 def scaled(rows: Array, factor: Array) -> Array:
-    """Rows, (n,) or (n, 3), times one number each."""
+    """Rows, (n,) or (n, 3), multiplied by one number each."""
     return np.asarray(rows * (factor if rows.ndim == 1 else factor[:, None]))
 
 
-def within(vectors: FloatArray, normal: FloatArray) -> FloatArray:
-    """Vectors without their part along unit normals, (n, 3)."""
+def tangential(vectors: FloatArray, normal: FloatArray) -> FloatArray:
+    """Tangential part of vectors: without their component along unit normals, (n, 3)."""
     return np.asarray(vectors - scaled(normal, dot(vectors, normal)))
 
 
-def across(axis: FloatArray, direction: FloatArray) -> FloatArray:
-    """An axis as rays see it: its part across them, scaled to unit length.
+def transverse_axis(axis: FloatArray, direction: FloatArray) -> FloatArray:
+    """Projection of an axis perpendicular to rays, scaled to unit length.
 
     Parameters
     ----------
@@ -191,22 +187,22 @@ def across(axis: FloatArray, direction: FloatArray) -> FloatArray:
         Unit, or 0 where the axis is along the ray.
     """
     # twice: what rounding leaves along a ray close to the axis
-    part = within(within(np.broadcast_to(axis, direction.shape), direction), direction)
+    part = tangential(tangential(np.broadcast_to(axis, direction.shape), direction), direction)
     size = np.sqrt(dot(part, part))
     seen = size > PARALLEL
     return np.where(seen[:, None], part / np.where(seen, size, 1.0)[:, None], 0.0)
 
 
-def lying(axis: FloatArray, normal: FloatArray, what: str) -> FloatArray:
-    """An axis as it lies in surfaces, (n, 3) unit; ValueError if it stands on one of them."""
-    lie = across(axis, normal)
+def tangential_axis(axis: FloatArray, normal: FloatArray, what: str) -> FloatArray:
+    """Projection of an axis into surfaces, (n, 3) unit; ValueError if it is normal to one of them."""
+    lie = transverse_axis(axis, normal)
     if not lie.any(axis=1).all():
         raise ValueError(f"{what}: expected a direction along the surface, got its normal {axis.tolist()}")
     return lie
 
 
-def carried(field: ComplexArray, before: FloatArray, after: FloatArray) -> ComplexArray:
-    """Fields of rays that are bent, turned by the least rotation that takes one direction to the other.
+def rotate_fields(field: ComplexArray, before: FloatArray, after: FloatArray) -> ComplexArray:
+    """Field vectors of deflected rays, rotated by the least rotation between the directions.
 
     Parameters
     ----------
@@ -226,8 +222,8 @@ def carried(field: ComplexArray, before: FloatArray, after: FloatArray) -> Compl
     return np.asarray(field - scaled(before + after, share))
 
 
-def bent(meeting: Meeting, gradient: FloatArray, back: bool) -> tuple[FloatArray, FloatArray]:
-    """Directions behind a path that varies along the surface: n d + its gradient is kept in the plane.
+def deflect(meeting: IncidentRays, gradient: FloatArray, back: bool) -> tuple[FloatArray, FloatArray]:
+    """Directions behind a path gradient along the surface: tangential n d grows by the gradient.
 
     Parameters
     ----------
@@ -246,7 +242,7 @@ def bent(meeting: Meeting, gradient: FloatArray, back: bool) -> tuple[FloatArray
     """
     normal, side = meeting.normal, -1.0 if back else 1.0
     facing = dot(meeting.direction, normal)
-    along = within(meeting.direction + gradient / meeting.index[:, None], normal)
+    along = tangential(meeting.direction + gradient / meeting.index[:, None], normal)
     rest = 1.0 - dot(along, along)
     possible = rest > 0.0
     rise = side * np.copysign(np.sqrt(np.where(possible, rest, 0.0)), facing)
@@ -254,21 +250,21 @@ def bent(meeting: Meeting, gradient: FloatArray, back: bool) -> tuple[FloatArray
     return np.where(possible[:, None], along + scaled(normal, rise), straight), possible.astype(np.float64)
 
 
-def sent(meeting: Meeting, direction: FloatArray, back: bool) -> ComplexArray:
-    """Fields that go on in new directions; those sent back are turned over as by an ideal mirror, -1."""
+def onward_fields(meeting: IncidentRays, direction: FloatArray, back: bool) -> ComplexArray:
+    """Field vectors along new directions; reflected ones are inverted as by an ideal mirror, -1."""
     if not back:
-        return carried(meeting.field, meeting.direction, direction)
+        return rotate_fields(meeting.field, meeting.direction, direction)
     facing = dot(meeting.direction, meeting.normal)
     mirrored = meeting.direction - scaled(meeting.normal, 2.0 * facing)
     field = meeting.field
     if field.ndim == 2:
         field = field - scaled(meeting.normal, 2.0 * dot(field, meeting.normal))
-    return carried(-field, mirrored, direction)
+    return rotate_fields(-field, mirrored, direction)
 
 
 @dataclass(frozen=True, eq=False)
 class Annulus:
-    """A stop that lets light pass between two radii, and absorbs the rest of what meets it.
+    """Annular stop: transmits between two radii, absorbs the rest.
 
     Parameters
     ----------
@@ -297,20 +293,20 @@ class Annulus:
         if not (all(isinstance(r, Real) for r in radii) and 0.0 <= self.inner < self.outer):
             raise ValueError(f"Annulus radii: expected 0 <= inner < outer in metres, got {radii}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The light between the radii; see `Element`."""
-        radius = np.linalg.norm(within(meeting.point - self.centre, meeting.normal), axis=1)
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Light between the radii; see `Element`."""
+        radius = np.linalg.norm(tangential(meeting.point - self.centre, meeting.normal), axis=1)
         passes = (radius >= self.inner) & (radius <= self.outer)
         return (Branch(scaled(meeting.field, passes)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Annulus:
-        """The stop turned about the origin, then shifted; as `Mesh.moved`."""
-        return Annulus(shifted(self.centre, offset, turn), self.inner, self.outer)
+        """The stop rotated about the origin, then shifted; as `Mesh.moved`."""
+        return Annulus(move_point(self.centre, offset, turn), self.inner, self.outer)
 
 
 @dataclass(frozen=True, eq=False)
 class IdealLens:
-    """A thin lens without aberrations for one pair of planes.
+    """Ideal thin lens, free of aberrations for one pair of conjugate planes.
 
     Slopes change by offset / focal length, so that each plane across the axis has a sharp image,
     1/s + 1/s' = 1/f. From each point of the plane at the object distance all rays have the same
@@ -357,8 +353,8 @@ class IdealLens:
         if not isinstance(distance, Real) or np.isnan(distance) or distance == 0.0:
             raise ValueError(f"IdealLens object distance: expected a length other than 0, got {distance!r}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The light bent towards the image; see `Element`."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Light deflected towards the image; see `Element`."""
         facing = component(meeting.direction, self.axis)
         forward = facing > 0.0
         before = 1.0 / self.object_distance  # vergences, which are 0 for a plane at infinity
@@ -375,7 +371,7 @@ class IdealLens:
         met &= size > 0.0
         direction = np.where(met[:, None], out / np.where(met, size, 1.0)[:, None], meeting.direction)
         path = self._path(q, chief, near, far) * meeting.index
-        field = scaled(carried(meeting.field, meeting.direction, direction), met)
+        field = scaled(rotate_fields(meeting.field, meeting.direction, direction), met)
         return (Branch(field, direction, None, np.where(met, path, 0.0)),)
 
     @staticmethod
@@ -393,6 +389,6 @@ class IdealLens:
         return np.asarray((skew - far * square) / sums[1] - (skew + near * square) / sums[0])
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> IdealLens:
-        """The lens turned about the origin, then shifted; as `Mesh.moved`."""
-        centre = shifted(self.centre, offset, turn)
-        return IdealLens(centre, turned(self.axis, turn), self.focal_length, self.object_distance)
+        """The lens rotated about the origin, then shifted; as `Mesh.moved`."""
+        centre = move_point(self.centre, offset, turn)
+        return IdealLens(centre, rotate_vector(self.axis, turn), self.focal_length, self.object_distance)

@@ -1,4 +1,4 @@
-"""Thin films: reflection and transmission of plane waves by stacks of layers, and by bare faces.
+"""Thin films: reflection and transmission of plane waves by layer stacks and bare interfaces.
 
 Amplitudes are those of E with fields as exp(+i k n x). r of p light has Byrnes' sign: at normal
 incidence r_p = -r_s, and H is reflected with r_p. Sources: M. Born, E. Wolf, Principles of Optics,
@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelength
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, filled
 from fringetrace.optics.materials.material import Material
 from fringetrace.optics.materials.named_materials import as_material
 
@@ -28,8 +28,8 @@ class Amplitudes(NamedTuple):
     tp: ComplexArray
 
 
-class Powers(NamedTuple):
-    """Fractions of the power of s and of p light; arrays of one shape."""
+class PolarisedPowers(NamedTuple):
+    """Power fractions of s and p light; arrays of one shape."""
 
     s: FloatArray
     p: FloatArray
@@ -37,7 +37,7 @@ class Powers(NamedTuple):
 
 @dataclass(frozen=True)
 class Film:
-    """Layers on each other, in the order that light from the front meets them.
+    """Thin-film stack: layers in the order in which light from the front meets them.
 
     Parameters
     ----------
@@ -70,16 +70,16 @@ class Film:
 
     @property
     def thickness(self) -> FloatArray:
-        """(m,) float64, metres."""
+        """Layer thicknesses, (m,) float64, metres."""
         return np.array([thickness for _, thickness in self.layers], dtype=np.float64)
 
     @property
     def dispersive(self) -> bool:
-        """Whether an index may change with the wavelength."""
+        """Whether an index may depend on the wavelength."""
         return any(material.dispersive for material, _ in self.layers)
 
     def indices(self, wavelength: npt.ArrayLike) -> ComplexArray:
-        """Complex indices of the layers.
+        """Complex refractive indices of the layers.
 
         Parameters
         ----------
@@ -96,14 +96,14 @@ class Film:
         return out
 
     def reversed(self) -> Film:
-        """The film as light from behind meets it."""
+        """The stack in reverse order, as light from behind meets it."""
         return Film(self.layers[::-1])
 
 
 def quarter_wave_stack(
     high: Material | complex | str, low: Material | complex | str, pairs: int, wavelength: float
 ) -> Film:
-    """The dielectric mirror (HL)^pairs H: layers a quarter of a wave thick at normal incidence.
+    """Dielectric mirror (HL)^pairs H of quarter-wave layers at normal incidence.
 
     Parameters
     ----------
@@ -143,17 +143,19 @@ def _incidence(
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
 ) -> tuple[tuple[int, ...], dict[str, Any]]:
-    """Shape of the answer, and flat arrays of sine2, first, layers, last and k0."""
+    """Shape of the answer, and flat arrays of q1, first, layers, last and k0, as in `layers.stack`."""
+    from fringetrace.optics.film_kernels import normal_part
+
     theta, w = np.broadcast_arrays(
         np.asarray(angle, dtype=np.float64), np.asarray(wavelength, dtype=np.float64)
     )
     _checked_angles(theta)
     flat = np.ascontiguousarray(w.reshape(-1))
     n1, n2 = (as_material(m, "half space").index(flat) for m in (first, last))
-    sine2 = (n1 * np.sin(theta.reshape(-1))) ** 2
     layers = (film or Film()).indices(flat)
     return theta.shape, {
-        "sine2": sine2, "first": n1, "layers": layers, "last": n2, "k0": 2.0 * math.pi / flat
+        "q1": normal_part(n1, theta.reshape(-1)), "first": n1, "layers": layers, "last": n2,
+        "k0": 2.0 * math.pi / flat
     }  # fmt: skip
 
 
@@ -164,7 +166,7 @@ def coefficients(
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
 ) -> Amplitudes:
-    """Amplitudes of E behind and before a film between two half spaces.
+    """Amplitude coefficients of a film between two half-spaces: r_s, r_p, t_s, t_p of E.
 
     Parameters
     ----------
@@ -191,7 +193,7 @@ def coefficients(
 
     shape, wave = _incidence(film, first, last, angle, wavelength)
     thickness = (film or Film()).thickness
-    out = stacks(wave["sine2"], wave["first"], wave["layers"], thickness, wave["last"], wave["k0"])
+    out = stacks(wave["q1"], wave["first"], wave["layers"], thickness, wave["last"], wave["k0"])
     return Amplitudes(*out.reshape(4, *shape))
 
 
@@ -201,8 +203,8 @@ def reflectance(
     last: Material | complex | str,
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
-) -> Powers:
-    """Fraction of the power that a film reflects, |r|^2; arguments as in `coefficients`.
+) -> PolarisedPowers:
+    """Reflectance of a film, |r|^2; arguments as in `coefficients`.
 
     Returns
     -------
@@ -210,7 +212,7 @@ def reflectance(
         s and p, float64 of the broadcast shape.
     """
     amplitudes = coefficients(film, first, last, angle, wavelength)
-    return Powers(np.abs(amplitudes.rs) ** 2, np.abs(amplitudes.rp) ** 2)
+    return PolarisedPowers(np.abs(amplitudes.rs) ** 2, np.abs(amplitudes.rp) ** 2)
 
 
 def transmittance(
@@ -219,8 +221,8 @@ def transmittance(
     last: Material | complex | str,
     angle: npt.ArrayLike,
     wavelength: npt.ArrayLike,
-) -> Powers:
-    """Fraction of the power that gets behind a film; arguments as in `coefficients`.
+) -> PolarisedPowers:
+    """Transmittance of a film; arguments as in `coefficients`.
 
     Returns
     -------
@@ -231,12 +233,12 @@ def transmittance(
 
     shape, wave = _incidence(film, first, last, angle, wavelength)
     amplitudes = coefficients(film, first, last, angle, wavelength)
-    s, p = shares(wave["sine2"], wave["first"], wave["last"]).reshape(2, *shape)
-    return Powers(s * np.abs(amplitudes.ts) ** 2, p * np.abs(amplitudes.tp) ** 2)
+    s, p = shares(wave["q1"], wave["first"], wave["last"]).reshape(2, *shape)
+    return PolarisedPowers(s * np.abs(amplitudes.ts) ** 2, p * np.abs(amplitudes.tp) ** 2)
 
 
 def fresnel(first: npt.ArrayLike, last: npt.ArrayLike, angle: npt.ArrayLike) -> Amplitudes:
-    """Fresnel's amplitudes of a bare face, from indices alone.
+    """Fresnel coefficients of a bare interface, from indices and angle of incidence.
 
     Parameters
     ----------
@@ -253,16 +255,17 @@ def fresnel(first: npt.ArrayLike, last: npt.ArrayLike, angle: npt.ArrayLike) -> 
     Raises
     ------
     ValueError
-        If an angle is not from 0 to pi/2.
+        If an angle is not from 0 to pi/2, or an index is not finite or 0.
     """
-    from fringetrace.optics.film_kernels import stacks
+    from fringetrace.optics.film_kernels import normal_part, stacks
 
-    n1, n2, theta = np.broadcast_arrays(
-        np.asarray(first, dtype=np.complex128), np.asarray(last, dtype=np.complex128),
-        np.asarray(angle, dtype=np.float64),
-    )  # fmt: skip
+    indices = [filled(n, np.complex128) for n in (first, last)]
+    for n in indices:
+        if not (np.isfinite(n) & (n != 0.0)).all():
+            raise ValueError(f"fresnel: expected finite indices n + i kappa, not 0, got {n}")
+    n1, n2, theta = np.broadcast_arrays(*indices, np.asarray(angle, dtype=np.float64))
     flat = _checked_angles(theta).reshape(-1)
     n1, n2, shape = np.ascontiguousarray(n1.reshape(-1)), np.ascontiguousarray(n2.reshape(-1)), theta.shape
     none = np.empty((len(flat), 0), np.complex128)
-    sine2 = (n1 * np.sin(flat)) ** 2
-    return Amplitudes(*stacks(sine2, n1, none, np.empty(0), n2, np.ones(len(flat))).reshape(4, *shape))
+    q1 = normal_part(n1, flat)
+    return Amplitudes(*stacks(q1, n1, none, np.empty(0), n2, np.ones(len(flat))).reshape(4, *shape))

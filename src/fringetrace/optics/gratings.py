@@ -1,4 +1,4 @@
-"""Gratings: orders of diffraction as branches of rays.
+"""Diffraction gratings: each order is a branch of the rays.
 
 The wave vector along the surface is kept, but for the gradient of the path. Where that leaves more than
 the whole wave vector, the wave is evanescent: the ray is blocked. With `reflects` an element works as one in
@@ -16,20 +16,19 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction, checked_vector
+from fringetrace.core import FloatArray, checked_direction, checked_vector, dot
 from fringetrace.optics.elements import (
     Branch,
-    Meeting,
+    IncidentRays,
     Waves,
-    asked,
-    bent,
-    checked_length,
-    dot,
-    lying,
+    deflect,
+    move_point,
+    onward_fields,
+    positive_length,
+    required_wavelength,
+    rotate_vector,
     scaled,
-    sent,
-    shifted,
-    turned,
+    tangential_axis,
 )
 
 # Orders may not carry more power than came; rounding is allowed for.
@@ -37,7 +36,7 @@ PASSIVE = 1.0 + 1e-12
 
 
 def checked_orders(orders: Any, what: str) -> tuple[int, ...]:
-    """Orders as a tuple; ValueError unless they are different whole numbers."""
+    """Checked diffraction orders as a tuple; ValueError unless they are different whole numbers."""
     listed = tuple(orders) if isinstance(orders, Iterable) else (orders,)
     whole = all(isinstance(m, (int, np.integer)) and not isinstance(m, bool) for m in listed)
     if not (whole and listed and len(set(listed)) == len(listed)):
@@ -61,7 +60,7 @@ def _checked_amplitudes(amplitudes: Any, count: int) -> tuple[complex, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Grating:
-    """A plane grating, which sends light into some of its orders.
+    """Plane diffraction grating that sends light into chosen orders.
 
     In order m the wave vector along the surface changes by m lambda / period along the axis,
     sin theta_m = sin theta_i + m lambda / period in the plane across the grooves, and the path by
@@ -105,40 +104,42 @@ class Grating:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Grating centre"))
         object.__setattr__(self, "orders", checked_orders(self.orders, "Grating"))
         object.__setattr__(self, "amplitudes", _checked_amplitudes(self.amplitudes, len(self.orders)))
-        checked_length(self.period, "Grating period")
+        positive_length(self.period, "Grating period")
 
     @property
     def branches(self) -> int:
-        """One for each order."""
+        """Number of orders."""
         return len(self.orders)
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The orders; see `Element`."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """One branch per order; see `Element`."""
         assert self.amplitudes is not None
-        lie = lying(self.axis, meeting.normal, "Grating axis")
+        lie = tangential_axis(self.axis, meeting.normal, "Grating axis")
         along = dot(meeting.point - self.centre, lie)
-        step = asked(meeting.wavelength, "Grating") / self.period
+        step = required_wavelength(meeting.wavelength, "Grating") / self.period
         return tuple(
-            diffracted(meeting, lie * (m * step), along * (m * step), amplitude, self.reflects)
+            diffracted_branch(meeting, lie * (m * step), along * (m * step), amplitude, self.reflects)
             for m, amplitude in zip(self.orders, self.amplitudes, strict=True)
         )
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Grating:
-        """The grating turned about the origin, then shifted; as `Mesh.moved`."""
-        centre = shifted(np.asarray(self.centre), offset, turn)
-        return replace(self, axis=turned(self.axis, turn), centre=centre)
+        """The grating rotated about the origin, then shifted; as `Mesh.moved`."""
+        centre = move_point(np.asarray(self.centre), offset, turn)
+        return replace(self, axis=rotate_vector(self.axis, turn), centre=centre)
 
 
-def diffracted(
-    meeting: Meeting, gradient: FloatArray, path: FloatArray, amplitude: complex, reflects: bool
+def diffracted_branch(
+    meeting: IncidentRays, gradient: FloatArray, path: FloatArray, amplitude: complex, reflects: bool
 ) -> Branch:
-    """The branch behind a path and its gradient (n, 3), times an amplitude."""
-    direction, possible = bent(meeting, gradient, reflects)
-    return Branch(scaled(amplitude * sent(meeting, direction, reflects), possible), direction, None, path)
+    """Branch behind an added path with its gradient (n, 3), multiplied by an amplitude."""
+    direction, possible = deflect(meeting, gradient, reflects)
+    return Branch(
+        scaled(amplitude * onward_fields(meeting, direction, reflects), possible), direction, None, path
+    )
 
 
 def lamellar(orders: Iterable[int], phase: float, fill: float = 0.5) -> tuple[complex, ...]:
-    """Amplitudes of a binary phase grating: exp(i phase) on the middle part of each period, 1 elsewhere.
+    """Order amplitudes of a binary phase grating: exp(i phase) on the middle of each period, 1 elsewhere.
 
     Parameters
     ----------
@@ -164,7 +165,7 @@ def lamellar(orders: Iterable[int], phase: float, fill: float = 0.5) -> tuple[co
 
 
 def sinusoidal(orders: Iterable[int], phase: float) -> tuple[complex, ...]:
-    """Amplitudes i^m J_m(phase) of a phase grating exp(i phase cos(2 pi x / period)).
+    """Order amplitudes i^m J_m(phase) of a phase grating exp(i phase cos(2 pi x / period)).
 
     Parameters
     ----------
@@ -181,8 +182,8 @@ def sinusoidal(orders: Iterable[int], phase: float) -> tuple[complex, ...]:
     return tuple(1j ** (m % 4) * complex(jv(m, phase)) for m in orders)
 
 
-def blazed(order: int, waves: float) -> complex:
-    """Amplitude of an order of a blazed grating that is so many waves deep.
+def blazed_amplitude(order: int, waves: float) -> complex:
+    """Order amplitude of a blazed grating of a given depth in waves.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What a surface does to a ray: complex amplitudes for the reflected and the transmitted branch."""
+"""Optical interfaces: amplitudes of the reflected and the transmitted branch."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PASSIVE = 1.0 + 1e-12
 
 
 class Interface(Protocol):
-    """Anything with an amplitude for each of the two branches."""
+    """Protocol of interfaces with a constant amplitude for each of the two branches."""
 
     @property
     def reflection(self) -> complex:
@@ -28,7 +28,7 @@ class Interface(Protocol):
 
     @property
     def transmission(self) -> complex:
-        """Amplitude of the branch that goes straight on."""
+        """Amplitude of the transmitted branch, relative to the incident one."""
 
 
 def _checked_fraction(value: float, what: str) -> float:
@@ -39,7 +39,7 @@ def _checked_fraction(value: float, what: str) -> float:
 
 @dataclass(frozen=True)
 class Mirror:
-    """Ideal mirror: the field is multiplied by -sqrt(reflectance), on both sides.
+    """Ideal mirror: multiplies the field by -sqrt(reflectance), on both sides.
 
     The sign is the half-wave loss at a denser medium. What is not reflected is absorbed.
 
@@ -61,33 +61,33 @@ class Mirror:
 
     @property
     def reflection(self) -> complex:
-        """-sqrt(reflectance)."""
+        """Amplitude of the reflected branch, -sqrt(reflectance)."""
         return complex(-math.sqrt(self.reflectance))
 
     @property
     def transmission(self) -> complex:
-        """Nothing passes."""
+        """Amplitude of the transmitted branch, 0."""
         return 0j
 
 
 @dataclass(frozen=True)
 class Absorber:
-    """Black: every ray ends here."""
+    """Absorber: ends every ray."""
 
     @property
     def reflection(self) -> complex:
-        """Nothing comes back."""
+        """Amplitude of the reflected branch, 0."""
         return 0j
 
     @property
     def transmission(self) -> complex:
-        """Nothing passes."""
+        """Amplitude of the transmitted branch, 0."""
         return 0j
 
 
 @dataclass(frozen=True)
 class BeamSplitter:
-    """Thin plate that sends light both ways, the same from either side.
+    """Thin beam splitter, the same from both sides.
 
     A symmetric lossless splitter conserves energy at every phase between its two inputs only
     if |r|^2 + |t|^2 = 1 and r is a quarter wave from t (Re(r* t) = 0); the default is the
@@ -135,7 +135,7 @@ def _checked_film(film: Film | None, what: str) -> None:
 
 @dataclass(frozen=True)
 class Dielectric:
-    """Boundary between the media in front of a surface and behind it: refraction after Snell and Fresnel.
+    """Dielectric boundary between two media: refraction and reflection by Snell and Fresnel.
 
     A beam without polarisation takes the amplitudes of s light (E along the boundary).
 
@@ -165,7 +165,7 @@ class Dielectric:
 
 @dataclass(frozen=True)
 class Metal:
-    """Boundary with a medium that swallows what gets into it: only the reflected branch is traced.
+    """Metal boundary: only the reflected branch is traced, the medium behind absorbs the rest.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class Metal:
 
 
 def reflect(direction: FloatArray, normal: FloatArray) -> FloatArray:
-    """Directions after reflection, d - 2 (n.d) n.
+    """Reflected directions, d - 2 (n.d) n.
 
     Parameters
     ----------
@@ -201,8 +201,8 @@ def reflect(direction: FloatArray, normal: FloatArray) -> FloatArray:
     return np.asarray(direction - 2.0 * along[:, None] * normal, dtype=np.float64)
 
 
-def refracted(direction: FloatArray, normal: FloatArray, before: float, behind: float) -> FloatArray:
-    """Direction after refraction, by Snell's law: what runs along the surface stays the same.
+def refract(direction: FloatArray, normal: FloatArray, before: float, behind: float) -> FloatArray:
+    """Refracted directions by Snell's law: the tangential component of n d is conserved.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Phase plates: a map of optical path over a plane; spatial light modulators, zone plates.
+"""Phase plates: a map of optical path over a plane; spatial light modulators and zone plates.
 
 Rays get the path at the point where they meet the plate, whatever their angle, and are bent by its gradient
 as by a grating of that period.
@@ -14,18 +14,18 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, frame
+from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, filled, frame
 from fringetrace.optics.elements import (
     Branch,
-    Meeting,
+    IncidentRays,
     Waves,
-    asked,
-    checked_length,
     checked_number,
-    shifted,
-    turned,
+    move_point,
+    positive_length,
+    required_wavelength,
+    rotate_vector,
 )
-from fringetrace.optics.gratings import blazed, checked_orders, diffracted
+from fringetrace.optics.gratings import blazed_amplitude, checked_orders, diffracted_branch
 
 Map = Callable[[FloatArray, FloatArray], FloatArray]
 Slopes = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
@@ -36,8 +36,8 @@ LEAST = 4  # samples that a cubic spline takes, each way
 
 
 @dataclass(frozen=True, eq=False)
-class Formula:
-    """A map given as a function, its gradient too, or else differenced over a step (fourth order)."""
+class FormulaRelief:
+    """Optical path map by a function, with its gradient or a finite-difference step (fourth order)."""
 
     opd: Map
     gradient: Slopes | None
@@ -54,8 +54,8 @@ class Formula:
 
 
 @dataclass(frozen=True, eq=False)
-class Pixels:
-    """A map of flat square pixels, [row, column] = [y, x]; beyond them the nearest goes on."""
+class PixelRelief:
+    """Optical path map of flat square pixels, [row, column] = [y, x], extended by the nearest pixel."""
 
     samples: FloatArray
     pitch: float
@@ -72,15 +72,15 @@ class Pixels:
 
 
 @dataclass(frozen=True, eq=False)
-class Spline:
-    """A bicubic spline through samples at the centres of pixels, which goes on beyond them."""
+class SplineRelief:
+    """Optical path map by a bicubic spline through samples at pixel centres."""
 
     samples: FloatArray
     pitch: float
 
     @cached_property
     def fit(self) -> Any:
-        """The spline, of (y, x) in metres from the centre."""
+        """Bicubic spline over (y, x) in metres from the centre."""
         from scipy.interpolate import NdBSpline, make_interp_spline
 
         y, x = ((np.arange(n) - 0.5 * (n - 1)) * self.pitch for n in self.samples.shape)
@@ -100,7 +100,7 @@ class Spline:
 
 @dataclass(frozen=True, eq=False)
 class PhasePlate:
-    """A map of optical path over a plane: aberration, spatial light modulator, diffractive element.
+    """Phase plate: a map of optical path over a plane (aberration, modulator, diffractive element).
 
     What the plate does to the whole wave, such as the orders that the pixels of a modulator send out,
     takes a diffraction integral, and is not in the rays.
@@ -122,7 +122,7 @@ class PhasePlate:
     design : float, metres, optional
         Wavelength at which the path is folded to less than one wave. Flat pixels then have opd mod
         design. A smooth map becomes a blazed diffractive one: its orders have the path
-        m lambda / design times the map, and the amplitude of `gratings.blazed`. None: not folded.
+        m lambda / design times the map, and the amplitude of `gratings.blazed_amplitude`. None: not folded.
     orders : tuple of int
         Branches of a folded smooth map; 1 is the wanted one, and has all light at the design wavelength.
     reflects : bool
@@ -146,7 +146,7 @@ class PhasePlate:
     design: float | None = None
     orders: tuple[int, ...] = (1,)
     reflects: bool = False
-    relief: Formula | Pixels | Spline = field(init=False, repr=False)
+    relief: FormulaRelief | PixelRelief | SplineRelief = field(init=False, repr=False)
 
     polarised: ClassVar[bool] = False
 
@@ -157,68 +157,72 @@ class PhasePlate:
         object.__setattr__(self, "up", up)
         object.__setattr__(self, "orders", checked_orders(self.orders, "PhasePlate"))
         if self.design is not None:
-            checked_length(self.design, "PhasePlate design")
+            positive_length(self.design, "PhasePlate design")
         object.__setattr__(self, "relief", self._checked_relief())
         if self.orders != (1,) and not self.chromatic:
             raise ValueError(
                 f"PhasePlate orders: expected (1,) unless a smooth map is folded, got {self.orders}"
             )
 
-    def _checked_relief(self) -> Formula | Pixels | Spline:
+    def _checked_relief(self) -> FormulaRelief | PixelRelief | SplineRelief:
         if self.interpolation not in INTERPOLATIONS:
             raise ValueError(
                 f"PhasePlate interpolation: expected one of {INTERPOLATIONS}, got {self.interpolation!r}"
             )
-        pitch = None if self.pitch is None else checked_length(self.pitch, "PhasePlate pitch")
+        pitch = None if self.pitch is None else positive_length(self.pitch, "PhasePlate pitch")
         if callable(self.opd):
             if (pitch is None) == (self.gradient is None):
                 raise ValueError("PhasePlate: expected either a gradient or a pitch beside a function")
-            return Formula(self.opd, self.gradient, pitch)
-        samples = np.array(self.opd, dtype=np.float64)
+            return FormulaRelief(self.opd, self.gradient, pitch)
+        samples = filled(self.opd).copy()
         if samples.ndim != 2 or not samples.size or not np.isfinite(samples).all():
             raise ValueError(f"PhasePlate opd: expected a table of finite metres, got shape {samples.shape}")
         if pitch is None or self.gradient is not None:
             raise ValueError("PhasePlate: expected a pitch and no gradient beside samples")
         if self.interpolation == "nearest":
-            return Pixels(samples, pitch, self.design)
+            return PixelRelief(samples, pitch, self.design)
         if min(samples.shape) < LEAST:
             raise ValueError(f"PhasePlate opd: expected at least 4 x 4 samples, got {samples.shape}")
-        return Spline(samples, pitch)
+        return SplineRelief(samples, pitch)
 
     @property
     def chromatic(self) -> bool:
         """Whether directions and paths depend on the wavelength."""
-        return self.design is not None and not isinstance(self.relief, Pixels)
+        return self.design is not None and not isinstance(self.relief, PixelRelief)
 
     @property
     def waves(self) -> Waves:
-        """Plane waves leave pixels torn, smooth maps curved."""
-        return "torn" if isinstance(self.relief, Pixels) else "curved"
+        """Effect on plane waves: pixels tear them, smooth maps curve them."""
+        return "torn" if isinstance(self.relief, PixelRelief) else "curved"
 
     @property
     def branches(self) -> int:
-        """One for each order."""
+        """Number of orders."""
         return len(self.orders)
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The light with its path changed, and bent; see `Element`."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Light with its path changed, deflected by the gradient; see `Element`."""
         offset = meeting.point - self.centre
         path, east, north = self.relief(component(offset, self.right), component(offset, self.up))
-        if isinstance(self.relief, Pixels) and not self.reflects:
+        if isinstance(self.relief, PixelRelief) and not self.reflects:
             return (Branch(meeting.field, path=path),)
         gradient = np.outer(east, self.right) + np.outer(north, self.up)
         if not self.chromatic:
-            return (diffracted(meeting, gradient, path, 1.0, self.reflects),)
-        waves = (self.design or 0.0) / asked(meeting.wavelength, "PhasePlate")
+            return (diffracted_branch(meeting, gradient, path, 1.0, self.reflects),)
+        waves = (self.design or 0.0) / required_wavelength(meeting.wavelength, "PhasePlate")
         return tuple(
-            diffracted(meeting, gradient * (m / waves), path * (m / waves), blazed(m, waves), self.reflects)
+            diffracted_branch(
+                meeting, gradient * (m / waves), path * (m / waves), blazed_amplitude(m, waves), self.reflects
+            )
             for m in self.orders
         )
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> PhasePlate:
-        """The plate turned about the origin, then shifted; as `Mesh.moved`."""
-        centre = shifted(self.centre, offset, turn)
-        return replace(self, centre=centre, right=turned(self.right, turn), up=turned(self.up, turn))
+        """The plate rotated about the origin, then shifted; as `Mesh.moved`."""
+        centre = move_point(self.centre, offset, turn)
+        return replace(
+            self, centre=centre, right=rotate_vector(self.right, turn), up=rotate_vector(self.up, turn)
+        )
 
 
 def _plane_axes(right: npt.ArrayLike, up: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -231,7 +235,7 @@ def _plane_axes(right: npt.ArrayLike, up: npt.ArrayLike) -> tuple[FloatArray, Fl
 
 @dataclass(frozen=True)
 class Focusing:
-    """Path over a plane that makes the spherical wave from one point of its axis into that to another.
+    """Optical path map that turns the spherical wave from one axial point into that to another.
 
     Parameters
     ----------
@@ -246,7 +250,7 @@ class Focusing:
 
     @property
     def distances(self) -> tuple[float, ...]:
-        """Object and image distance, metres, those that are finite."""
+        """Object and image distance in metres, those that are finite."""
         vergences = 1.0 / self.object_distance, 1.0 / self.focal_length - 1.0 / self.object_distance
         return tuple(1.0 / vergence for vergence in vergences if vergence != 0.0)
 
@@ -259,7 +263,7 @@ class Focusing:
         return self.index * path
 
     def slopes(self, x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives by x and y."""
+        """Derivatives of the path along x and y."""
         square = x * x + y * y
         slope = np.zeros_like(square)
         for s in self.distances:
@@ -277,7 +281,7 @@ def zone_plate(
     index: float = 1.0,
     reflects: bool = False,
 ) -> PhasePlate:
-    """A phase plate that images one point of its axis exactly onto another.
+    """Zone plate: a phase plate that images one axial point exactly onto another.
 
     Parameters
     ----------

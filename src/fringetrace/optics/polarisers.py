@@ -1,4 +1,4 @@
-"""Elements that act on polarisation: polariser, retarder, and any Jones matrix.
+"""Polarising elements: polariser, retarder and Jones matrices.
 
 The retarder's sign is fixed here: the component along its axis goes as exp(+i retardance), the one across
 as 1. With fields exp(-i w t) a positive retardance delays it: the axis is the slow one, as the optic axis
@@ -14,21 +14,20 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_direction
+from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, filled
 from fringetrace.optics.elements import (
     Branch,
-    Index,
-    Meeting,
+    IncidentRays,
+    RealIndex,
     Waves,
-    across,
-    asked,
     checked_index,
-    checked_length,
     checked_number,
-    dot,
     index_at,
+    positive_length,
+    required_wavelength,
+    rotate_vector,
     scaled,
-    turned,
+    transverse_axis,
     vectors_of,
 )
 
@@ -38,7 +37,7 @@ PASSIVE = 1.0 + 1e-12
 
 @dataclass(frozen=True, eq=False)
 class Polariser:
-    """Lets the component along its axis pass, and absorbs the one across.
+    """Linear polariser: transmits the component along its axis, absorbs the one across.
 
     Parameters
     ----------
@@ -66,18 +65,18 @@ class Polariser:
         if not 0.0 <= checked_number(self.extinction, "Polariser extinction") <= 1.0:
             raise ValueError(f"Polariser extinction: expected a number from 0 to 1, got {self.extinction!r}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The component along the axis; see `Element`."""
-        return (Branch(weighed(meeting, "Polariser", self.axis, 1.0, self.extinction**0.5)),)
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Component along the axis; see `Element`."""
+        return (Branch(scale_components(meeting, "Polariser", self.axis, 1.0, self.extinction**0.5)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Polariser:
-        """The polariser turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        """The polariser rotated; as `Mesh.moved`."""
+        return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 @dataclass(frozen=True, eq=False)
 class Retarder:
-    """Delays the component along its axis against the one across.
+    """Retarder: delays the component along its axis relative to the one across.
 
     Parameters
     ----------
@@ -113,7 +112,7 @@ class Retarder:
                 f"Retarder design: expected None beside a function of the wavelength, got {self.design}"
             )
         if self.design is not None:
-            checked_length(self.design, "Retarder design")
+            positive_length(self.design, "Retarder design")
 
     @property
     def chromatic(self) -> bool:
@@ -137,22 +136,24 @@ class Retarder:
             If it depends on the wavelength, and that is None.
         """
         if callable(self.retardance):
-            return float(self.retardance(asked(wavelength, "Retarder")))
-        return self.retardance * (self.design / asked(wavelength, "Retarder") if self.design else 1.0)
+            return float(self.retardance(required_wavelength(wavelength, "Retarder")))
+        return self.retardance * (
+            self.design / required_wavelength(wavelength, "Retarder") if self.design else 1.0
+        )
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """Both components, one of them delayed; see `Element`."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Both components, one delayed; see `Element`."""
         delay = complex(np.exp(1j * self.at(meeting.wavelength)))
-        return (Branch(weighed(meeting, "Retarder", self.axis, delay, 1.0)),)
+        return (Branch(scale_components(meeting, "Retarder", self.axis, delay, 1.0)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Retarder:
-        """The retarder turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        """The retarder rotated; as `Mesh.moved`."""
+        return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 @dataclass(frozen=True)
 class Birefringence:
-    """Retardance of a crystal plate, 2 pi (n_e - n_o) thickness / wavelength: a function of the wavelength.
+    """Retardance of a crystal plate over the wavelength, 2 pi (n_e - n_o) thickness / wavelength.
 
     Parameters
     ----------
@@ -166,14 +167,14 @@ class Birefringence:
         If an index or the thickness is not positive.
     """
 
-    ordinary: Index
-    extraordinary: Index
+    ordinary: RealIndex
+    extraordinary: RealIndex
     thickness: float
 
     def __post_init__(self) -> None:
         checked_index(self.ordinary, "Birefringence ordinary index")
         checked_index(self.extraordinary, "Birefringence extraordinary index")
-        checked_length(self.thickness, "Birefringence thickness")
+        positive_length(self.thickness, "Birefringence thickness")
 
     def __call__(self, wavelength: float) -> float:
         """Retardance in radians at a wavelength in metres."""
@@ -182,7 +183,7 @@ class Birefringence:
 
 
 def wave_plate(axis: npt.ArrayLike, waves: float, design: float | None = None) -> Retarder:
-    """A retarder by waves: 1/2 half-wave, 1/4 quarter-wave, 10.25 a quarter-wave plate of tenth order.
+    """Wave plate: retarder by waves; 1/2 half-wave, 1/4 quarter-wave, 10.25 quarter-wave of tenth order.
 
     Parameters
     ----------
@@ -202,7 +203,7 @@ def wave_plate(axis: npt.ArrayLike, waves: float, design: float | None = None) -
 
 @dataclass(frozen=True, eq=False)
 class JonesPlate:
-    """Any linear action on the two components of a field that absorbs or keeps power.
+    """Jones matrix element: any passive linear action on the two field components.
 
     Parameters
     ----------
@@ -230,11 +231,11 @@ class JonesPlate:
         object.__setattr__(self, "matrix", _checked_matrix(self.matrix))
         object.__setattr__(self, "axis", checked_direction(self.axis, "JonesPlate axis"))
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The field times the matrix; see `Element`."""
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Field times the matrix; see `Element`."""
         field = vectors_of(meeting, "JonesPlate")
         behind = dot(meeting.direction, meeting.normal) > 0.0
-        first = across(self.axis, meeting.direction)
+        first = transverse_axis(self.axis, meeting.direction)
         second = scaled(np.cross(meeting.direction, first), np.where(behind, -1.0, 1.0))
         a, b = dot(field, first), dot(field, second)
         m = self.matrix
@@ -242,13 +243,13 @@ class JonesPlate:
         return (Branch(scaled(first, m[0, 0] * a + upper * b) + scaled(second, lower * a + m[1, 1] * b)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> JonesPlate:
-        """The plate turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        """The plate rotated; as `Mesh.moved`."""
+        return replace(self, axis=rotate_vector(self.axis, turn))
 
 
 def _checked_matrix(value: Any) -> ComplexArray:
     try:
-        matrix = np.array(value, dtype=np.complex128)
+        matrix = filled(value, np.complex128).copy()
     except (TypeError, ValueError) as error:
         raise ValueError(f"JonesPlate matrix: expected 2 x 2 complex numbers, got {value!r}") from error
     if matrix.shape != (2, 2) or not np.isfinite(matrix).all():
@@ -259,8 +260,10 @@ def _checked_matrix(value: Any) -> ComplexArray:
     return matrix
 
 
-def weighed(meeting: Meeting, what: str, axis: FloatArray, along: complex, rest: complex) -> ComplexArray:
-    """Fields with their component along an axis times one number, and the rest times another."""
+def scale_components(
+    meeting: IncidentRays, what: str, axis: FloatArray, along: complex, rest: complex
+) -> ComplexArray:
+    """Fields with the component along an axis multiplied by one number, the rest by another."""
     field = vectors_of(meeting, what)
-    seen = across(axis, meeting.direction)
+    seen = transverse_axis(axis, meeting.direction)
     return np.asarray(rest * field + scaled(seen, (along - rest) * dot(field, seen)))

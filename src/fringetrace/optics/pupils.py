@@ -1,4 +1,4 @@
-"""The numerical aperture of an objective: which directions get through, wherever rays cross its plane."""
+"""Pupil of an objective: the numerical aperture limits ray directions, wherever rays cross its plane."""
 
 from __future__ import annotations
 
@@ -8,13 +8,21 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction
-from fringetrace.optics.elements import Branch, Meeting, Waves, checked_number, dot, scaled, turned, within
+from fringetrace.core import FloatArray, checked_direction, dot
+from fringetrace.optics.elements import (
+    Branch,
+    IncidentRays,
+    Waves,
+    checked_number,
+    rotate_vector,
+    scaled,
+    tangential,
+)
 
 
 @dataclass(frozen=True, eq=False)
 class Pupil:
-    """Lets rays pass whose direction is within a numerical aperture, and absorbs the rest.
+    """Pupil: transmits rays within a numerical aperture, absorbs the rest.
 
     Parameters
     ----------
@@ -43,12 +51,12 @@ class Pupil:
         if not checked_number(self.aperture, "Pupil aperture") > 0.0:
             raise ValueError(f"Pupil aperture: expected a positive number, got {self.aperture!r}")
 
-    def act(self, meeting: Meeting) -> tuple[Branch, ...]:
-        """The light within the aperture; see `Element`."""
-        aside = within(meeting.direction, np.broadcast_to(self.axis, meeting.direction.shape))
+    def act(self, meeting: IncidentRays) -> tuple[Branch, ...]:
+        """Light within the aperture; see `Element`."""
+        aside = tangential(meeting.direction, np.broadcast_to(self.axis, meeting.direction.shape))
         passes = meeting.index**2 * dot(aside, aside) <= self.aperture**2
         return (Branch(scaled(meeting.field, passes)),)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Pupil:
-        """The pupil turned; as `Mesh.moved`."""
-        return replace(self, axis=turned(self.axis, turn))
+        """The pupil rotated; as `Mesh.moved`."""
+        return replace(self, axis=rotate_vector(self.axis, turn))

@@ -1,5 +1,6 @@
 from .heights import (
     height as height,
+    optical_path as optical_path,
     remove_mean as remove_mean,
     remove_plane as remove_plane,
     synthetic_wavelength as synthetic_wavelength,

@@ -1,4 +1,6 @@
-"""Wrapped phase to height: unwrapping, two wavelengths, planes taken off. Phase stepping is here too.
+"""Height from wrapped phase: unwrapping, synthetic wavelength, piston and tilt removal.
+
+What a numpy.ma array masks is unknown, and comes out as NaN.
 
 References
 ----------
@@ -13,7 +15,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_wavelength
+from fringetrace.core import FloatArray, checked_wavelength, filled
 from fringetrace.phase.stepping import (
     carre,
     four_step,
@@ -47,7 +49,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 
 def wrap(phase: npt.ArrayLike) -> FloatArray:
-    """Phase modulo 2 pi.
+    """Wrap a phase modulo 2 pi into (-pi, pi].
 
     Parameters
     ----------
@@ -58,7 +60,7 @@ def wrap(phase: npt.ArrayLike) -> FloatArray:
     float64, radians in (-pi, pi], shape of `phase`
     """
     turn = 2.0 * math.pi
-    folded = np.fmod(np.asarray(phase, dtype=np.float64), turn)
+    folded = np.fmod(filled(phase), turn)
     folded = np.where(folded > math.pi, folded - turn, folded)
     return np.where(folded <= -math.pi, folded + turn, folded)
 
@@ -67,11 +69,11 @@ def _checked_map(
     values: npt.ArrayLike, mask: npt.ArrayLike | None, what: str
 ) -> tuple[FloatArray, BoolArray]:
     """A map, and which of its pixels count."""
-    pixels = np.asarray(values, dtype=np.float64)
+    pixels = filled(values)
     if pixels.ndim != 2:
         raise ValueError(f"{what}: expected a map of shape (rows, columns), got shape {pixels.shape}")
     valid = np.isfinite(pixels)
-    if mask is not None:
+    if mask is not None and mask is not np.ma.nomask:
         left_out = np.asarray(mask, dtype=np.bool_)
         if left_out.shape != pixels.shape:
             raise ValueError(f"{what} mask: expected shape {pixels.shape}, got {left_out.shape}")
@@ -93,7 +95,7 @@ def _unwrapped(phase: FloatArray, valid: BoolArray) -> FloatArray:
 
 
 def unwrap(phase: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArray:
-    """Continuous phase of a wrapped map.
+    """Unwrap a phase map into a continuous one.
 
     The true phase must change by less than pi from pixel to pixel along enough ways through the map: a step
     higher than a quarter of the wavelength (in reflection) needs `two_wavelength`. Herraez 2002, as in
@@ -133,8 +135,29 @@ def unwrap(phase: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArra
     return result
 
 
+def optical_path(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
+    """Optical path difference of a phase difference: phase * wavelength / (2 pi).
+
+    Parameters
+    ----------
+    phase : float64, radians, any shape
+    wavelength : float, metres
+
+    Returns
+    -------
+    float64, metres, shape of `phase`
+
+    Raises
+    ------
+    ValueError
+        If the wavelength is not a positive length.
+    """
+    scale = checked_wavelength(wavelength) / (2.0 * math.pi)
+    return np.asarray(filled(phase) * scale, dtype=np.float64)
+
+
 def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
-    """Height of a reflecting surface: phase * wavelength / (4 pi), towards the light.
+    """Height of a reflecting surface from its phase, phase * wavelength / (4 pi), towards the light.
 
     Parameters
     ----------
@@ -151,12 +174,11 @@ def height(phase: npt.ArrayLike, wavelength: float) -> FloatArray:
     ValueError
         If the wavelength is not a positive length.
     """
-    scale = checked_wavelength(wavelength) / (4.0 * math.pi)
-    return np.asarray(np.asarray(phase, dtype=np.float64) * scale, dtype=np.float64)
+    return np.asarray(0.5 * optical_path(phase, wavelength), dtype=np.float64)
 
 
 def synthetic_wavelength(wavelength1: float, wavelength2: float) -> float:
-    """Wavelength of the beat of two others: l1 l2 / |l1 - l2| (Cheng 1984).
+    """Synthetic (beat) wavelength of two others: l1 l2 / |l1 - l2| (Cheng 1984).
 
     Parameters
     ----------
@@ -180,7 +202,7 @@ def synthetic_wavelength(wavelength1: float, wavelength2: float) -> float:
 def two_wavelength(
     phase1: npt.ArrayLike, phase2: npt.ArrayLike, wavelength1: float, wavelength2: float
 ) -> FloatArray:
-    """Height of a reflecting surface from its wrapped phases at two wavelengths.
+    """Height of a reflecting surface from wrapped phases at two wavelengths.
 
     The beat phase gives a coarse height, L wrap(phi1 - phi2) / (4 pi) with L the synthetic wavelength; the
     coarse height chooses the order of the phase at the shorter wavelength, which gives the fine one.
@@ -199,7 +221,7 @@ def two_wavelength(
         erfc(pi / (sqrt(2) sigma q)), q**2 = (L / l - 1)**2 + (L / l)**2, l the shorter wavelength.
     """
     beat = synthetic_wavelength(wavelength1, wavelength2)
-    fine, other = np.asarray(phase1, dtype=np.float64), np.asarray(phase2, dtype=np.float64)
+    fine, other = filled(phase1), filled(phase2)
     shorter = float(wavelength1)
     if wavelength1 > wavelength2:
         fine, other, shorter = other, fine, float(wavelength2)
@@ -209,7 +231,7 @@ def two_wavelength(
 
 
 def remove_mean(values: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArray:
-    """A map without its piston.
+    """Remove the piston from a map.
 
     Parameters
     ----------
@@ -232,7 +254,7 @@ def remove_mean(values: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> Flo
 
 
 def remove_plane(values: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> FloatArray:
-    """A map without its piston and tilt: minus the plane that fits it best in least squares.
+    """Remove piston and tilt from a map: subtract its least-squares plane.
 
     Raises like `remove_mean`.
 

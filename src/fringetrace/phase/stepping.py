@@ -1,7 +1,8 @@
 """Phase stepping: interferogram frames to wrapped phase.
 
 Frames are I_k = A + B cos(phi + alpha_k), with the steps alpha_k added to the reference arm. Phases that
-cannot be determined (no modulation above rounding, frames that are not finite) are NaN.
+cannot be determined (no modulation above rounding, frames that are not finite, or masked as in numpy.ma)
+are NaN.
 
 References
 ----------
@@ -21,7 +22,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray
+from fringetrace.core import FloatArray, filled
 
 # Sums of frames that cancel leave a few units in the last place of their largest term.
 ROUNDING = 4.0 * float(np.finfo(np.float64).eps)
@@ -33,7 +34,7 @@ def _checked_frames(frames: npt.ArrayLike, what: str, count: int | None = None) 
     """Real frames along the first axis: `count` of them, or 3 or more."""
     if np.iscomplexobj(frames):
         raise ValueError(f"{what} frames: expected real intensities, got complex numbers; take |E|**2")
-    values = np.asarray(frames, dtype=np.float64)
+    values = filled(frames)
     found = len(values) if values.ndim else 0
     if found < 3 or (count is not None and found != count):
         expected = "3 or more" if count is None else str(count)
@@ -57,7 +58,7 @@ def _root(square: FloatArray) -> FloatArray:
 
 
 def four_step(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of 0, 90, 180, 270 degrees: tan phi = (I4 - I2) / (I1 - I3).
+    """Phase from four steps of 0, 90, 180, 270 degrees: tan phi = (I4 - I2) / (I1 - I3).
 
     Creath 1988.
 
@@ -81,7 +82,7 @@ def four_step(frames: npt.ArrayLike) -> FloatArray:
 
 
 def three_step(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -120, 0, 120 degrees: tan phi = sqrt(3) (I1 - I3) / (2 I2 - I1 - I3).
+    """Phase from three steps of -120, 0, 120 degrees: tan phi = sqrt(3) (I1 - I3) / (2 I2 - I1 - I3).
 
     Creath 1988; raises like `four_step`.
 
@@ -100,7 +101,7 @@ def three_step(frames: npt.ArrayLike) -> FloatArray:
 
 
 def hariharan(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -180, -90, 0, 90, 180 degrees: tan phi = 2 (I2 - I4) / (2 I3 - I1 - I5).
+    """Phase from five steps of -180 to 180 degrees (Hariharan): tan phi = 2 (I2 - I4) / (2 I3 - I1 - I5).
 
     A step that is wrong by e shifts the phase only by up to e**2 / 4.
     Schwider 1983, Hariharan 1987; raises like `four_step`.
@@ -120,7 +121,7 @@ def hariharan(frames: npt.ArrayLike) -> FloatArray:
 
 
 def carre(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -3a, -a, a, 3a, for any a that is the same throughout, 0 < a < 90 degrees.
+    """Phase by Carre's algorithm from steps of -3a, -a, a, 3a, for any constant 0 < a < 90 degrees.
 
     With p = 3 (I2 - I3) - (I1 - I4) and q = (I2 - I3) + (I1 - I4),
     |tan phi| = sqrt(p q) / ((I2 + I3) - (I1 + I4)); the sign of sin phi is that of I2 - I3.
@@ -144,7 +145,7 @@ def carre(frames: npt.ArrayLike) -> FloatArray:
 
 
 def stoilov(frames: npt.ArrayLike) -> FloatArray:
-    """Phase from steps of -2a, -a, 0, a, 2a, for any a that is the same throughout, 0 < a < 180 degrees.
+    """Phase by Stoilov's algorithm from steps of -2a, -a, 0, a, 2a, for any constant 0 < a < 180 degrees.
 
     tan phi = 2 (I2 - I4) sin a / (2 I3 - I1 - I5), where cos a = (I1 - I5) / (2 (I2 - I4)).
     Stoilov 1997; raises like `four_step`.
@@ -198,7 +199,7 @@ def n_bucket(frames: npt.ArrayLike) -> FloatArray:
 
 
 def least_squares(frames: npt.ArrayLike, steps: npt.ArrayLike) -> FloatArray:
-    """Phase from known steps of any size: least squares on A + C cos alpha_k + S sin alpha_k.
+    """Phase from known steps of any size, by least squares on A + C cos alpha_k + S sin alpha_k.
 
     Greivenkamp 1984.
 
@@ -220,7 +221,7 @@ def least_squares(frames: npt.ArrayLike, steps: npt.ArrayLike) -> FloatArray:
         fewer than three steps differ.
     """
     values = _checked_frames(frames, "least_squares")
-    alpha = np.asarray(steps, dtype=np.float64)
+    alpha = filled(steps)
     if alpha.shape != (len(values),) or not np.isfinite(alpha).all():
         raise ValueError(
             f"least_squares steps: expected {len(values)} finite angles in radians, one a frame, "
@@ -235,7 +236,7 @@ def least_squares(frames: npt.ArrayLike, steps: npt.ArrayLike) -> FloatArray:
 
 
 def modulation(frames: npt.ArrayLike) -> FloatArray:
-    """Visibility B / A of the fringes, from n equal steps 2 pi k / n, n >= 3.
+    """Fringe visibility B / A from n equal steps 2 pi k / n, n >= 3.
 
     Creath 1988; raises like `n_bucket`.
 

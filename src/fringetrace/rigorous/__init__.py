@@ -1,4 +1,4 @@
-"""Exact wave solutions of cylinders, gratings of them and spheres, and how far rays hold beside them."""
+"""Exact wave solutions of cylinders, gratings of cylinders and spheres, and the validity of rays."""
 
 import lazy_loader
 

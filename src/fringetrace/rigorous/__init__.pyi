@@ -4,7 +4,7 @@ from . import (
     effective_medium as effective_medium,
     mie as mie,
 )
-from .cylinder_gratings import spectrum as spectrum
+from .cylinder_gratings import reflectance_spectrum as reflectance_spectrum
 from .cylinders import Cylinders as Cylinders, differential_width as differential_width, scatter as scatter
-from .cylindrical_waves import CONDUCTOR as CONDUCTOR, Index as Index, Polarisation as Polarisation
+from .cylindrical_waves import CONDUCTOR as CONDUCTOR, Index as Index
 from .ray_validity import Validity as Validity, validity as validity

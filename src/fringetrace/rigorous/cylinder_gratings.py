@@ -1,4 +1,4 @@
-"""Rigorous light on lattices of infinite rows of circular cylinders, in a host slab between two half-spaces.
+"""Rigorous diffraction by stacked gratings of circular cylinders in a host slab between two half-spaces.
 
 The plane across the cylinders: x along a row, depth downwards from the front face; light travels in that
 plane. Within a row cylindrical harmonics are coupled by lattice sums; rows and faces exchange plane waves
@@ -18,17 +18,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_lengths, checked_whole
+from fringetrace.optics import Polarisation, check_polarisation
 from fringetrace.rigorous.cylindrical_waves import (
     Index,
-    Polarisation,
-    at_wavelength,
     boundary,
-    check_polarisation,
+    indices_at,
     lattice_sums,
     truncation,
 )
-from fringetrace.rigorous.effective_medium import Powers, effective_index, stack
+from fringetrace.rigorous.effective_medium import SlabPowers, effective_index, stack_powers
 
 _SLICES = 64  # flat layers a pitch, of method "multilayer"
 _EVANESCENT = 7  # diffraction orders beyond those that propagate: reciprocity then holds to 1e-11
@@ -37,7 +36,7 @@ _GRAZING = 1e-7  # of k: wavenumbers across the rows are kept this far from zero
 
 @dataclass(frozen=True)
 class Row:
-    """An infinite row of circular cylinders, one a pitch.
+    """Infinite row (grating) of circular cylinders, one per pitch.
 
     Attributes
     ----------
@@ -56,8 +55,8 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Lattice:
-    """Rows of cylinders in a host slab between a front and a back half-space.
+class CylinderGratings:
+    """Stacked rows of cylinders in a host slab between a front and a back half-space.
 
     Attributes
     ----------
@@ -86,7 +85,7 @@ class Lattice:
     back: Index | None = None
 
     def __post_init__(self) -> None:
-        if not (self.pitch > 0 and self.thickness > 0):
+        if not (0 < self.pitch < math.inf and 0 < self.thickness < math.inf):
             lengths = f"pitch {self.pitch}, thickness {self.thickness}"
             raise ValueError(f"Lattice: expected positive lengths in metres, got {lengths}")
         rows = tuple(sorted(self.rows, key=lambda row: row.depth))
@@ -101,7 +100,7 @@ class Lattice:
 
 
 class Diffraction(NamedTuple):
-    """Light off and through a lattice, by diffraction order.
+    """Reflected and transmitted light of a lattice, by diffraction order.
 
     Attributes
     ----------
@@ -142,16 +141,16 @@ class _Light(NamedTuple):
         return np.where(abs(found) < _GRAZING * abs(k), _GRAZING * abs(k), found)
 
     def flux(self, index: ComplexArray) -> ComplexArray:
-        """Wavenumbers across over 1 ("E") or the square of the index ("H"): what keeps flux continuous."""
+        """Wavenumbers across over 1 ("s") or the square of the index ("p"): what keeps flux continuous."""
         across = self.across(index)
-        return across if self.polarisation == "E" else across / index[..., None] ** 2
+        return across if self.polarisation == "s" else across / index[..., None] ** 2
 
 
 def diffract(
-    lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike = 0.0, polarisation: Polarisation = "E",
-    orders: int | None = None, harmonics: int | None = None,
+    lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike = 0.0,
+    polarisation: Polarisation = "s", orders: int | None = None, harmonics: int | None = None,
 ) -> Diffraction:  # fmt: skip
-    """A plane wave from the front on a lattice.
+    """Diffraction of a plane wave from the front by a lattice of cylinders.
 
     Parameters
     ----------
@@ -160,7 +159,7 @@ def diffract(
         In vacuum; broadcasts with `angle`.
     angle : float or array, radians
         Of incidence, in the front medium.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
         The field along the cylinders.
     orders : int, optional
         Highest diffraction order G; by default those that propagate and 7 more, on either side.
@@ -174,13 +173,16 @@ def diffract(
     Raises
     ------
     ValueError
-        If a wavelength is not positive, the polarisation unknown, or front or host absorb.
+        If a wavelength is not positive, an angle not finite, a number of orders none, the polarisation
+        unknown, or front or host absorb.
     """
     check_polarisation(polarisation)
-    wavelength, angle = np.broadcast_arrays(np.asarray(wavelength, np.float64), np.asarray(angle, np.float64))
+    wavelength, angle = _light(wavelength, angle)
     front, host, back = _media(lattice, wavelength)
     vacuum = 2.0 * math.pi / wavelength
-    if orders is None:
+    if orders is not None:
+        orders = checked_whole(orders, 0, "Orders")
+    else:
         orders = _EVANESCENT + math.ceil(2.0 * np.max(host.real * lattice.pitch / wavelength))
     order = np.arange(-orders, orders + 1)
     beta = (vacuum * front.real * np.sin(angle))[..., None] + order * 2.0 * math.pi / lattice.pitch
@@ -189,7 +191,8 @@ def diffract(
     above = 0.0
     for row, following in zip_longest(lattice.rows, lattice.rows[1:]):
         middle = lattice.thickness if following is None else (row.depth + following.depth) / 2.0
-        reach = harmonics or truncation(float(np.max(host.real * vacuum)) * row.radius)
+        own = truncation(float(np.max(host.real * vacuum)) * row.radius)
+        reach = own if harmonics is None else checked_whole(harmonics, 0, "Harmonics")
         section = _row(light, lattice.pitch, row, host, wavelength, reach)
         whole = _join(whole, _spaced(light, host, section, row.depth - above, middle - row.depth))
         above = middle
@@ -205,12 +208,12 @@ def diffract(
     )  # fmt: skip
 
 
-def spectrum(
-    lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike = 0.0,
+def reflectance_spectrum(
+    lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike = 0.0,
     polarisation: Polarisation | Literal["unpolarised"] = "unpolarised",
     method: str = "rods",
-) -> Powers:  # fmt: skip
-    """Reflectance and transmittance of a lattice, all diffraction orders together.
+) -> SlabPowers:  # fmt: skip
+    """Reflectance and transmittance of a lattice of cylinders, summed over the diffraction orders.
 
     Parameters
     ----------
@@ -219,7 +222,7 @@ def spectrum(
         In vacuum; broadcasts with `angle`.
     angle : float or array, radians
         Of incidence, in the front medium.
-    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
+    polarisation : ``"s"``, ``"p"`` or ``"unpolarised"``
         The last is the mean of the two others.
     method : ``"rods"`` or ``"multilayer"``
         Rigorous, or flat layers of effective index: quicker, without diffraction orders, some 5 % off.
@@ -234,30 +237,32 @@ def spectrum(
         If the method or the polarisation is unknown.
     """
     if polarisation == "unpolarised":
-        e = spectrum(lattice, wavelength, angle, "E", method)
-        h = spectrum(lattice, wavelength, angle, "H", method)
-        return Powers((e.reflectance + h.reflectance) / 2.0, (e.transmittance + h.transmittance) / 2.0)
+        e = reflectance_spectrum(lattice, wavelength, angle, "s", method)
+        h = reflectance_spectrum(lattice, wavelength, angle, "p", method)
+        return SlabPowers((e.reflectance + h.reflectance) / 2.0, (e.transmittance + h.transmittance) / 2.0)
     check_polarisation(polarisation)
     if method == "multilayer":
         return _blurred(lattice, wavelength, angle, polarisation)
     if method != "rods":
         raise ValueError(f"Method: expected 'rods' or 'multilayer', got {method!r}")
     found = diffract(lattice, wavelength, angle, polarisation)
-    return Powers(found.reflectance.sum(-1), found.transmittance.sum(-1))
+    return SlabPowers(found.reflectance.sum(-1), found.transmittance.sum(-1))
 
 
-def _blurred(lattice: Lattice, wavelength: ArrayLike, angle: ArrayLike, polarisation: Polarisation) -> Powers:
+def _blurred(
+    lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike, polarisation: Polarisation
+) -> SlabPowers:
     """Powers of the lattice as a stack of thin flat layers of effective index."""
-    wavelength, angle = np.broadcast_arrays(np.asarray(wavelength, np.float64), np.asarray(angle, np.float64))
+    wavelength, angle = _light(wavelength, angle)
     front, host, back = _media(lattice, wavelength)
     faces = np.linspace(0.0, lattice.thickness, math.ceil(_SLICES * lattice.thickness / lattice.pitch) + 1)
     fractions = [_filling(row, lattice.pitch, faces) for row in lattice.rows]
     fractions.append(1.0 - np.sum(fractions, 0) * np.ones(len(faces) - 1))
-    indices = [*(at_wavelength(row.index, wavelength) for row in lattice.rows), host]
+    indices = [*(indices_at(row.index, wavelength) for row in lattice.rows), host]
     if not np.all(np.isfinite(indices)):
         raise ValueError("Method 'multilayer': expected finite refractive indices, got a perfect conductor")
     mixed = effective_index(np.stack(fractions, -1), np.stack(indices, -1)[..., None, :], polarisation)
-    return stack(np.diff(faces), mixed, front, back, wavelength, angle, polarisation)
+    return stack_powers(np.diff(faces), mixed, front, back, wavelength, angle, polarisation)
 
 
 def _filling(row: Row, pitch: float, faces: FloatArray) -> FloatArray:
@@ -268,12 +273,22 @@ def _filling(row: Row, pitch: float, faces: FloatArray) -> FloatArray:
     return found
 
 
-def _media(lattice: Lattice, wavelength: FloatArray) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+def _light(wavelength: ArrayLike, angle: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Wavelengths and angles of incidence of one shape, at least one of each."""
+    lengths, angles = np.broadcast_arrays(
+        checked_lengths(wavelength, "Wavelength"), checked_angles(angle, "Angle of incidence")
+    )
+    if lengths.size == 0:
+        raise ValueError(f"Wavelength: expected at least one, got shape {lengths.shape}")
+    return lengths, angles
+
+
+def _media(
+    lattice: CylinderGratings, wavelength: FloatArray
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """Index of front, host and back at each wavelength."""
-    if not np.all(wavelength > 0):
-        raise ValueError(f"Wavelength: expected positive lengths in metres, got {wavelength.min()}")
     behind = lattice.host if lattice.back is None else lattice.back
-    front, host, back = (at_wavelength(index, wavelength) for index in (lattice.front, lattice.host, behind))
+    front, host, back = (indices_at(index, wavelength) for index in (lattice.front, lattice.host, behind))
     for name, index in (("Front", front), ("Host", host)):
         if not (np.all(index.real > 0) and np.all(index.imag == 0)):
             raise ValueError(f"{name}: expected a positive real refractive index, got {index}")
@@ -300,7 +315,7 @@ def _row(
     """A row of cylinders, phases at its axis."""
     k = (host.real * light.vacuum)[..., None]
     gamma = light.across(host)
-    index = at_wavelength(row.index, wavelength)
+    index = indices_at(row.index, wavelength)
     response, weight, _ = boundary(row.radius, index, host.real, wavelength, light.polarisation, harmonics)
     n = np.arange(-harmonics, harmonics + 1)
     sums = lattice_sums(light.beta[..., light.beta.shape[-1] // 2], k[..., 0], pitch, 2 * harmonics)

@@ -1,7 +1,7 @@
-"""Rigorous light on parallel circular cylinders: cylindrical harmonics and multiple scattering.
+"""Rigorous scattering by parallel circular cylinders: cylindrical waves and multiple scattering.
 
 Everything lies in the plane across the cylinders, x and y; light travels in that plane. Polarisation
-``"E"`` has the electric field along the cylinders, ``"H"`` the magnetic field; that field component is
+``"s"`` has the electric field along the cylinders, ``"p"`` the magnetic field; that field component is
 the wave u. Outside a cylinder j, with polar coordinates about its centre,
 
     u = sum_n [a_jn J_n(k r) + b_jn H_n(k r)] exp(i n phi),    b_jn = S_jn a_jn,
@@ -20,14 +20,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole
+from fringetrace.optics import Polarisation
 from fringetrace.rigorous.cylindrical_waves import (
     CONDUCTOR as CONDUCTOR,
     Index,
-    Polarisation,
-    at_wavelength,
     boundary,
+    checked_index,
+    damped,
     hankel,
+    indices_at,
     truncation,
 )
 from fringetrace.rigorous.multiple_scattering import solve
@@ -50,7 +52,7 @@ class Cylinders:
     Raises
     ------
     ValueError
-        If shapes do not match, a radius is not positive, or cylinders overlap.
+        If shapes do not match, a radius is not positive, an index is none, or cylinders overlap.
     """
 
     centres: ArrayLike
@@ -62,18 +64,24 @@ class Cylinders:
         centres = np.atleast_2d(np.asarray(self.centres, np.float64))
         if centres.ndim != 2 or centres.shape[1] != 2 or len(centres) == 0:
             raise ValueError(f"Cylinders: expected centres of shape (n, 2), got {centres.shape}")
+        if not np.isfinite(centres).all():
+            raise ValueError("Cylinders: expected finite centres in metres, got NaN or infinity")
         radii = np.broadcast_to(np.asarray(self.radii, np.float64), (len(centres),))
-        if not np.all(radii > 0):
+        if not np.all((radii > 0) & (radii < np.inf)):
             raise ValueError(f"Cylinders: expected positive radii in metres, got {radii.min()}")
-        if isinstance(self.index, Sequence) and len(self.index) != len(centres):
-            raise ValueError(f"Cylinders: expected 1 or {len(centres)} indices, got {len(self.index)}")
+        several = _each(self.index)
+        if len(several) not in (1, len(centres)):
+            raise ValueError(f"Cylinders: expected 1 or {len(centres)} indices, got {len(several)}")
+        for index in (*several, self.host):
+            if not callable(index):
+                checked_index(index, "Cylinders")
         _check_apart(centres, radii)
         object.__setattr__(self, "centres", centres)
         object.__setattr__(self, "radii", radii)
 
 
 class Widths(NamedTuple):
-    """Power taken out of a beam over its irradiance: metres, (q,) for q angles of incidence."""
+    """Cross-sections per length (widths) of extinction, scattering and absorption, metres, (q,)."""
 
     extinction: FloatArray
     scattering: FloatArray
@@ -82,14 +90,14 @@ class Widths(NamedTuple):
 
 @dataclass(frozen=True)
 class Scattered:
-    """Waves around cylinders, of one wavelength.
+    """Waves scattered by cylinders at one wavelength.
 
     Attributes
     ----------
     cylinders : Cylinders
     wavelength : float, metres
         In vacuum.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     angle : (q,) float64, radians
         Where the incident waves travel to, from +x towards +y.
     exciting, outgoing : (q, n, 2 N + 1) complex128
@@ -105,17 +113,17 @@ class Scattered:
 
     @property
     def wavenumber(self) -> float:
-        """In the host, 1/m."""
+        """Wavenumber in the host, 1/m."""
         return _wavenumber(self.cylinders, self.wavelength)
 
     @property
     def orders(self) -> Array:
-        """The orders -N to N."""
+        """Orders -N to N of the cylindrical waves."""
         half = self.outgoing.shape[-1] // 2
         return np.arange(-half, half + 1)
 
 
-def coefficients(
+def scattering_coefficients(
     radius: ArrayLike, index: ArrayLike, host: float, wavelength: ArrayLike, polarisation: Polarisation,
     orders: int,
 ) -> ComplexArray:  # fmt: skip
@@ -129,7 +137,7 @@ def coefficients(
         n + i kappa; `CONDUCTOR` for a perfect conductor.
     host : float or array
         Refractive index around.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     orders : int
         N.
 
@@ -144,22 +152,22 @@ def coefficients(
 def efficiencies(
     radius: float, index: complex, host: float, wavelength: float, polarisation: Polarisation
 ) -> Widths:
-    """Efficiencies of one cylinder: extinction, scattering, absorption widths over its diameter.
+    """Efficiencies of one cylinder: extinction, scattering and absorption width over diameter.
 
-    Arguments as in `coefficients`; Bohren and Huffman, eq. 8.36.
+    Arguments as in `scattering_coefficients`; Bohren and Huffman, eq. 8.36.
     """
     size = 2.0 * math.pi * host * radius / wavelength
-    found = coefficients(radius, index, host, wavelength, polarisation, truncation(size))
+    found = scattering_coefficients(radius, index, host, wavelength, polarisation, truncation(size))
     extinction = -2.0 / size * found.real.sum(-1)
     scattering = 2.0 / size * (abs(found) ** 2).sum(-1)
     return Widths(extinction, scattering, extinction - scattering)
 
 
 def scatter(
-    cylinders: Cylinders, wavelength: float, angle: ArrayLike = 0.0, polarisation: Polarisation = "E",
+    cylinders: Cylinders, wavelength: float, angle: ArrayLike = 0.0, polarisation: Polarisation = "s",
     orders: int | None = None,
 ) -> Scattered:  # fmt: skip
-    """Plane waves on a cluster of cylinders.
+    """Scattering of plane waves by a cluster of cylinders, with multiple scattering.
 
     Solved by elimination, or, where many centres lie on a rectangular grid (a lattice, staggered or not),
     by iteration with the coupling as a convolution.
@@ -171,7 +179,7 @@ def scatter(
         In vacuum.
     angle : float or (q,), radians
         Where the waves travel to, from +x towards +y.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     orders : int, optional
         N; by default `truncation` of the largest cylinder.
 
@@ -185,11 +193,11 @@ def scatter(
         If the wavelength is not positive, the polarisation unknown, the host absorbs, or there are too many
         cylinders off a grid.
     """
-    if not wavelength > 0:
+    if not 0 < wavelength < math.inf:
         raise ValueError(f"Wavelength: expected a positive length in metres, got {wavelength}")
     k = _wavenumber(cylinders, wavelength)
     radii = np.asarray(cylinders.radii)
-    orders = truncation(k * radii.max()) if orders is None else orders
+    orders = truncation(k * radii.max()) if orders is None else checked_whole(orders, 0, "Orders")
     response, weight, _ = boundary(
         radii,
         _indices(cylinders, wavelength),
@@ -198,14 +206,14 @@ def scatter(
         polarisation,
         orders,
     )
-    angles = np.atleast_1d(np.asarray(angle, np.float64))
+    angles = np.atleast_1d(checked_angles(angle, "Angle"))
     incident = _incident(cylinders, k, angles, orders)
     exciting = solve(np.asarray(cylinders.centres), k, response, weight, incident)
     return Scattered(cylinders, wavelength, polarisation, angles, exciting, response * exciting)
 
 
 def amplitude(scattered: Scattered, direction: ArrayLike) -> ComplexArray:
-    """Scattering amplitude f: far off, u = sqrt(2 / (pi k r)) exp(i (k r - pi / 4)) f.
+    """Scattering amplitude f in the far field: u = sqrt(2 / (pi k r)) exp(i (k r - pi / 4)) f.
 
     Parameters
     ----------
@@ -217,7 +225,7 @@ def amplitude(scattered: Scattered, direction: ArrayLike) -> ComplexArray:
     -------
     (q, t) complex128
     """
-    direction = np.atleast_1d(np.asarray(direction, np.float64))
+    direction = np.atleast_1d(checked_angles(direction, "Direction"))
     n, k = scattered.orders, scattered.wavenumber
     centres = np.asarray(scattered.cylinders.centres)
     turned = scattered.outgoing * (-1j) ** n
@@ -237,7 +245,7 @@ def differential_width(scattered: Scattered, direction: ArrayLike) -> FloatArray
 
 
 def widths(scattered: Scattered) -> Widths:
-    """Extinction, scattering and absorption widths, each found by itself, in metres.
+    """Extinction, scattering and absorption widths in metres, each computed independently.
 
     Extinction from the forward amplitude (optical theorem), scattering from the integral of the differential
     width, absorption from the power that flows into each cylinder; extinction is the sum of the two others.
@@ -256,7 +264,7 @@ def widths(scattered: Scattered) -> Widths:
 
 
 def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
-    """The wave u, incident and scattered, at points outside and inside the cylinders.
+    """Near field u, incident and scattered, at points outside and inside the cylinders.
 
     Parameters
     ----------
@@ -266,7 +274,7 @@ def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
     Returns
     -------
     (q, p) complex128
-        The electric ("E") or magnetic ("H") field along the cylinders, over the incident amplitude.
+        The electric ("s") or magnetic ("p") field along the cylinders, over the incident amplitude.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     k, cylinders = scattered.wavenumber, scattered.cylinders
@@ -288,8 +296,6 @@ def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
 
 def _inner_field(scattered: Scattered, j: int, points: FloatArray) -> ComplexArray:
     """The wave inside cylinder j at points (p, 2) in it."""
-    from scipy.special import jve
-
     cylinders, half = scattered.cylinders, int(scattered.orders[-1])
     index = _indices(cylinders, scattered.wavelength)[j]
     if np.isinf(index):
@@ -299,8 +305,7 @@ def _inner_field(scattered: Scattered, j: int, points: FloatArray) -> ComplexArr
     offset = points - np.asarray(cylinders.centres)[j]
     distance, azimuth = np.hypot(*offset.T)[:, None], np.arctan2(offset[:, 1], offset[:, 0])[:, None]
     k = 2.0 * math.pi * index / scattered.wavelength
-    damped = np.exp(abs(k.imag) * (distance - radius))  # jve and `inner` are free of exp(|Im|)
-    wave = jve(scattered.orders, k * distance) * damped * np.exp(1j * azimuth * scattered.orders)
+    wave = damped(scattered.orders, k * distance[:, 0], k * radius) * np.exp(1j * azimuth * scattered.orders)
     found: ComplexArray = (scattered.exciting[:, j] * inner) @ wave.T
     return found
 
@@ -316,16 +321,22 @@ def _incident(cylinders: Cylinders, k: float, angle: FloatArray, orders: int) ->
 
 def _wavenumber(cylinders: Cylinders, wavelength: float) -> float:
     """Wave number in the host, 1/m."""
-    host = complex(at_wavelength(cylinders.host, np.asarray(wavelength)))
+    host = complex(indices_at(cylinders.host, np.asarray(wavelength)))
     if not (host.real > 0 and host.imag == 0):
         raise ValueError(f"Host: expected a positive real refractive index, got {host}")
     return 2.0 * math.pi * host.real / wavelength
 
 
+def _each(index: Index | Sequence[Index]) -> Sequence[Index]:
+    """Indices of the cylinders, or one for all."""
+    if isinstance(index, np.ndarray) and index.ndim:
+        return list(index)
+    return index if isinstance(index, Sequence) and not isinstance(index, str) else [index]
+
+
 def _indices(cylinders: Cylinders, wavelength: float) -> ComplexArray:
     """Refractive index of each cylinder at a wavelength, (n,) complex128."""
-    several = cylinders.index if isinstance(cylinders.index, Sequence) else [cylinders.index]
-    values = [at_wavelength(index, np.asarray(wavelength)) for index in several]
+    values = [indices_at(index, np.asarray(wavelength)) for index in _each(cylinders.index)]
     return np.broadcast_to(np.asarray(values, np.complex128), (len(np.asarray(cylinders.centres)),))
 
 

@@ -1,17 +1,17 @@
-"""Cylindrical harmonics H_n(k r) exp(i n phi): one cylinder's answer, and what a row sends to itself."""
+"""Cylindrical waves H_n(k r) exp(i n phi): scattering by one cylinder, and lattice sums of a row."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_lengths, checked_whole
+from fringetrace.optics import Polarisation, check_polarisation
 
-Polarisation = Literal["E", "H"]
 Index = complex | Callable[[Any], Any]
 
 CONDUCTOR: complex = complex(math.inf)  # the index of a perfect conductor
@@ -19,11 +19,12 @@ _STEP = 0.05  # of the midpoint rule; poles nearer to the path than a few of the
 _NEAR = 4  # poles on either side that may be that near
 _FAR = 1.0  # of k, detuning from which an order's pole counts exp(-88)
 _TOUCHING = 5e-15  # of k: no diffraction order grazes closer than that
+LARGEST = 1e200  # waves of orders that a tiny cylinder does without are held there: products stay finite
 _OVERFLOW = 600.0  # exponent beyond which the integrand is nothing
 
 
 def truncation(size_parameter: float) -> int:
-    """Highest order N that a cylinder of size parameter k a needs.
+    """Truncation order N of the cylindrical waves for a size parameter k a.
 
     W. J. Wiscombe's rule (Appl. Opt. 19, 1505 (1980)), with its constants raised until the first order left
     out is 1e-13 of the largest, for k a = 0.01 to 1000. Cylinders that almost touch may need more.
@@ -31,23 +32,46 @@ def truncation(size_parameter: float) -> int:
     return math.ceil(size_parameter + 6.0 * math.cbrt(size_parameter) + 2.0)
 
 
-def at_wavelength(index: Index, wavelength: FloatArray) -> ComplexArray:
-    """Refractive index at each of some wavelengths in metres, complex128 of their shape."""
+def checked_index(index: Any, what: str) -> ComplexArray:
+    """Refractive indices, once they are known to be some.
+
+    Parameters
+    ----------
+    index : complex or array
+        n + i kappa, or `CONDUCTOR`.
+    what : str
+        The name used in the error message.
+
+    Returns
+    -------
+    complex128, shape of `index`
+
+    Raises
+    ------
+    ValueError
+        If one is missing, NaN, 0, or no number.
+    """
+    try:
+        value = np.asarray(index, np.complex128)
+    except (TypeError, ValueError):
+        value = np.asarray(np.nan, np.complex128)
+    wrong = np.isnan(value) | (value == 0.0)
+    if wrong.any():
+        raise ValueError(f"{what}: expected a refractive index n + i kappa, not 0, got {index!r}")
+    return value
+
+
+def indices_at(index: Index, wavelength: FloatArray) -> ComplexArray:
+    """Refractive index at wavelengths in metres, complex128 of their shape."""
     value = index(wavelength) if callable(index) else index
-    return np.broadcast_to(np.asarray(value, np.complex128), wavelength.shape)
-
-
-def check_polarisation(polarisation: str) -> None:
-    """Raise ValueError unless the polarisation is "E" or "H"."""
-    if polarisation not in ("E", "H"):
-        raise ValueError(f"Polarisation: expected 'E' or 'H', got {polarisation!r}")
+    return np.broadcast_to(checked_index(value, "Index"), wavelength.shape)
 
 
 def boundary(
     radius: ArrayLike, index: ArrayLike, host: ArrayLike, wavelength: ArrayLike, polarisation: Polarisation,
     orders: int,
 ) -> tuple[Array, FloatArray, Array]:  # fmt: skip
-    """What the boundary of a cylinder does to each harmonic (Bohren and Huffman, 8.30 to 8.37).
+    """Boundary conditions of a cylinder for each order (Bohren and Huffman, 8.30 to 8.37).
 
     Parameters
     ----------
@@ -57,7 +81,7 @@ def boundary(
         n + i kappa; `CONDUCTOR` for a perfect conductor.
     host : float or array
         Refractive index around.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
         The field along the cylinder.
     orders : int
         N.
@@ -69,58 +93,111 @@ def boundary(
     weight : (..., 2 N + 1) float64
         |H_n(k a)|.
     within : (..., 2 N + 1) complex128
-        The wave inside is ``within`` a J_n(k' r) exp(-|Im k' a|), k' the wavenumber there.
+        The wave inside is ``within`` a J_n(k' r) / J_n(k' a), k' the wavenumber there; see `damped`.
 
     Raises
     ------
     ValueError
-        If the polarisation is unknown.
+        If the polarisation is unknown, an index or the number of orders is none, or a length is not positive
+        and finite.
     """
-    from scipy.special import jv, jve
+    from scipy.special import jv
+
+    from fringetrace.rigorous.bessel import ratios
 
     check_polarisation(polarisation)
     radius, index, host, wavelength = (
-        np.asarray(v)[..., None] for v in np.broadcast_arrays(radius, index, host, wavelength)
+        np.asarray(v)[..., None]
+        for v in np.broadcast_arrays(radius, checked_index(index, "Index"), host, wavelength)
     )
+    radius, wavelength = checked_lengths(radius, "Radius"), checked_lengths(wavelength, "Wavelength")
+    if not np.all((host > 0.0) & (host < np.inf)):
+        raise ValueError(f"Host: expected a positive real refractive index, got {host[..., 0]}")
+    orders = checked_whole(orders, 0, "Orders")
     n = np.arange(orders + 2)
     x = 2.0 * math.pi * host * radius / wavelength
     j, h = jv(n, x), hankel(x[..., 0], orders + 1)[..., orders + 1 :]
     conducting = np.isinf(index)
-    ratio = np.where(conducting, 1.0, index) / host
-    inner = jve(n, ratio * x)  # over exp(|Im|), which cancels
-    (j, dj), (h, dh), (inner, dinner) = (_with_derivative(v) for v in (j, h, inner))
-    contrast = ratio if polarisation == "E" else 1.0 / ratio
-    below = contrast * dinner * h - inner * dh
-    response = -(contrast * dinner * j - inner * dj) / below
-    hard = -j / h if polarisation == "E" else -dj / dh
+    contrast = np.where(conducting, 1.0, index) / host
+    z = (contrast * x)[..., 0]
+    inside = ratios(z, 1.0, orders + 1)  # J_{n-1} / J_n from n = 1, of what may underflow
+    (j, dj), (h, dh) = _with_derivative(j, n / x), _with_derivative(h, n / x)
+    rest = inside[..., :-1] - n[1:-1] / z[..., None]
+    slope = np.concatenate([-1.0 / inside[..., :1], rest], -1)  # J_n' / J_n
+    slope = slope * (contrast if polarisation == "s" else 1.0 / contrast)
+    below = slope * h - dh
+    response = -(slope * j - dj) / below
+    hard = -j / h if polarisation == "s" else -dj / dh
     response = np.where(conducting, hard, response)
     within = np.where(conducting, 0.0, -2j / (math.pi * x) / below)
-    fold = abs(np.arange(-orders, orders + 1))
+    order = np.arange(-orders, orders + 1)
+    fold, sign = abs(order), np.where(order < 0, (-1.0) ** order, 1.0)  # of J_-n and H_-n
     weight = np.asarray(abs(h)[..., fold], np.float64)
-    return response[..., fold], weight, within[..., fold]
+    return response[..., fold], weight, within[..., fold] * sign
 
 
-def _with_derivative(cylinder_function: ComplexArray) -> tuple[ComplexArray, ComplexArray]:
-    """Z_n and Z_n' of orders 0 to N, from Z_n of orders 0 to N + 1."""
-    z = cylinder_function
-    slope = np.concatenate([-z[..., 1:2], (z[..., :-2] - z[..., 2:]) / 2.0], -1)
-    return z[..., :-1], slope
+def _with_derivative(wave: ComplexArray, steep: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Z_n and Z_n' = Z_{n-1} - n Z_n / x of orders 0 to N, from Z_n and n / x of orders 0 to N + 1."""
+    slope = np.concatenate([-wave[..., 1:2], wave[..., :-2] - steep[..., 1:-1] * wave[..., 1:-1]], -1)
+    return wave[..., :-1], slope
 
 
 def hankel(argument: FloatArray, orders: int) -> ComplexArray:
-    """H_n^(1) of orders -N to N, (..., 2 N + 1), by upward recurrence, along which it never shrinks."""
+    """H_n^(1) of orders -N to N, (..., 2 N + 1), by upward recurrence, along which it never shrinks.
+
+    Above `LARGEST` it is held there.
+    """
     from scipy.special import hankel1
 
     rising = [hankel1(0, argument), hankel1(1, argument)]
     for n in range(1, orders):
-        rising.append(2.0 * n / argument * rising[n] - rising[n - 1])
+        rising.append(_held(2.0 * n / argument * rising[n] - rising[n - 1]))
     positive = np.stack(rising[: orders + 1], -1)
     sign = (-1.0) ** np.arange(orders, 0, -1)
     return np.concatenate([sign * positive[..., :0:-1], positive], -1)
 
 
-def waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
-    """H_l(k R) exp(i l phi) of orders -N to N at displacements (..., 2), zero at displacement zero."""
+def _held(wave: ComplexArray) -> ComplexArray:
+    """A wave of a size up to `LARGEST`: of higher ones Y_n is all that float64 knows, and below 0."""
+    return np.where(abs(wave) > LARGEST, -1j * LARGEST, wave)
+
+
+def damped(orders: Array, inner: ArrayLike, outer: complex) -> ComplexArray:
+    """Ratios J_n(z) / J_n(z') of waves inside a cylinder, z on the way from its axis to z' on its surface.
+
+    Parameters
+    ----------
+    orders : (2 N + 1,) int
+        -N to N.
+    inner : (p,) complex
+        z.
+    outer : complex
+        z', of the same argument.
+
+    Returns
+    -------
+    (p, 2 N + 1) complex128
+    """
+    from scipy.special import jve
+
+    from fringetrace.rigorous.bessel import ratios
+
+    half, z = int(orders[-1]), np.asarray(inner, np.complex128)[:, None]
+    n = np.arange(half + 1)
+    there = jve(n, outer)
+    known = int(np.flatnonzero(abs(there) > 1.0 / LARGEST)[-1]) + 1  # beyond, both underflow
+    found = np.zeros((len(z), half + 1), np.complex128)
+    shrunk = np.exp(abs(z.imag) - abs(outer.imag))  # jve is free of exp(|Im|)
+    found[:, :known] = jve(n[:known], z) / there[:known] * shrunk
+    if known <= half:
+        tiny = np.where(abs(z) < abs(outer) / LARGEST, outer / LARGEST, z)
+        steps = ratios(outer, 1.0, half)[known - 1 :] / ratios(tiny[:, 0], 1.0, half)[:, known - 1 :]
+        found[:, known:] = found[:, known - 1 : known] * np.cumprod(steps, -1)
+    return found[:, abs(orders)]
+
+
+def outgoing_waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
+    """Cylindrical waves H_l(k R) exp(i l phi), orders -N to N, at displacements (..., 2); 0 at R = 0."""
     distance = np.hypot(displacement[..., 0], displacement[..., 1])
     here = distance == 0.0
     azimuth = np.arctan2(displacement[..., 1], displacement[..., 0])
@@ -131,7 +208,7 @@ def waves(displacement: FloatArray, k: float, orders: int) -> ComplexArray:
 
 
 def lattice_sums(beta: ArrayLike, k: ArrayLike, pitch: float, orders: int) -> ComplexArray:
-    """Lattice sums of a row: the waves H_l(k R) exp(i l phi) at one cylinder from all the others in the row.
+    """Lattice sums of a row: cylindrical waves at one cylinder from all the others in the row.
 
     The cylinder at j d sends with the phase exp(i beta j d), and R, phi lead from it to the cylinder at 0.
 

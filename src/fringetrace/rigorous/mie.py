@@ -1,4 +1,4 @@
-"""Rigorous light on one sphere: the Lorenz-Mie series (Bohren and Huffman, chapter 4)."""
+"""Mie scattering by one sphere: the Lorenz-Mie series (Bohren and Huffman, chapter 4)."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import ComplexArray
-from fringetrace.rigorous.cylindrical_waves import truncation
+from fringetrace.core import Array, ComplexArray, checked_angles
+from fringetrace.rigorous.cylindrical_waves import LARGEST, checked_index, truncation
 
 
 class Efficiencies(NamedTuple):
-    """Cross-sections over pi a^2, and the mean cosine of the scattering angle."""
+    """Efficiencies (cross-sections over pi a^2), and the mean cosine of the scattering angle."""
 
     extinction: float
     scattering: float
@@ -22,7 +22,7 @@ class Efficiencies(NamedTuple):
     asymmetry: float
 
 
-def coefficients(
+def mie_coefficients(
     radius: float, index: complex, host: float, wavelength: float
 ) -> tuple[ComplexArray, ComplexArray]:
     """Mie coefficients a_n and b_n, n = 1 to N.
@@ -32,7 +32,7 @@ def coefficients(
     radius, wavelength : float, metres
         The wavelength in vacuum.
     index : complex
-        n + i kappa.
+        n + i kappa; `harmonics.CONDUCTOR` for a perfect conductor.
     host : float
         Refractive index around.
 
@@ -43,31 +43,38 @@ def coefficients(
     Raises
     ------
     ValueError
-        If radius, host or wavelength is not positive.
+        If radius, host or wavelength is not a positive finite number, or the index is none.
     """
-    from scipy.special import jv, jve, yv
+    from scipy.special import jv, yv
 
-    if not (radius > 0 and host > 0 and wavelength > 0):
+    from fringetrace.rigorous.bessel import ratios
+
+    if not all(0 < length < math.inf for length in (radius, host, wavelength)):
         raise ValueError(
             f"Sphere: expected positive radius, host and wavelength, got {radius}, {host}, {wavelength}"
         )
-    x, m = 2.0 * math.pi * host * radius / wavelength, complex(index) / host
+    x, m = 2.0 * math.pi * host * radius / wavelength, complex(checked_index(index, "Sphere")) / host
     n = np.arange(truncation(x) + 1)
-    psi = math.sqrt(math.pi * x / 2.0) * jv(n + 0.5, x)
-    xi = psi + 1j * math.sqrt(math.pi * x / 2.0) * yv(n + 0.5, x)
-    inner = jve(n + 0.5, m * x)  # over exp(|Im|), which cancels
-    n = n[1:]
-    # psi'(m x) and psi'(x), xi'(x) by Z_n' = Z_{n-1} - n Z_n / z
-    d_inner, d_psi, d_xi = (f[:-1] - n * f[1:] / z for f, z in ((inner, m * x), (psi, x), (xi, x)))
-    inner, psi, xi = inner[1:], psi[1:], xi[1:]
-    a = (m * inner * d_psi - psi * d_inner) / (m * inner * d_xi - xi * d_inner)
-    b = (inner * d_psi - m * psi * d_inner) / (inner * d_xi - m * xi * d_inner)
+    scale = math.sqrt(math.pi * x / 2.0)
+    psi: Array = scale * jv(n + 0.5, x)
+    chi: Array = scale * yv(n + 0.5, x)
+    chi = np.maximum(chi, -LARGEST)  # of orders that tiny spheres do without
+    n, xi = n[1:], psi + 1j * chi
+    if not np.isfinite(m):  # a perfect conductor
+        return _matched(psi, n / x) / _matched(xi, n / x), psi[1:] / xi[1:]
+    inside = ratios(m * x, 1.5, len(n)) - n / (m * x)  # psi'(m x) / psi(m x)
+    a, b = (_matched(psi, slope) / _matched(xi, slope) for slope in (inside / m + n / x, m * inside + n / x))
     return a, b
 
 
+def _matched(wave: Array, slope: Array) -> ComplexArray:
+    """What is wrong at the boundary with a wave of orders 0 to N: slope Z_n - Z_{n-1}, n = 1 to N."""
+    return np.asarray(slope * wave[1:] - wave[:-1], np.complex128)
+
+
 def efficiencies(radius: float, index: complex, host: float, wavelength: float) -> Efficiencies:
-    """Efficiencies of one sphere; arguments as in `coefficients`."""
-    a, b = coefficients(radius, index, host, wavelength)
+    """Efficiencies of one sphere; arguments as in `mie_coefficients`."""
+    a, b = mie_coefficients(radius, index, host, wavelength)
     x, n = 2.0 * math.pi * host * radius / wavelength, np.arange(1, len(a) + 1)
     weight = 2 * n + 1
     extinction = 2.0 / x**2 * (weight * (a + b).real).sum()
@@ -75,30 +82,35 @@ def efficiencies(radius: float, index: complex, host: float, wavelength: float) 
     back = abs((weight * (-1.0) ** n * (a - b)).sum()) ** 2 / x**2
     neighbours = (a[:-1] * a[1:].conj() + b[:-1] * b[1:].conj()).real
     moment = (n * (n + 2) / (n + 1))[:-1] @ neighbours + (weight / (n * (n + 1))) @ (a * b.conj()).real
-    asymmetry = 4.0 * moment / x**2 / scattering
+    asymmetry = 4.0 * moment / x**2 / scattering if scattering > 0.0 else 0.0
     return Efficiencies(*map(float, (extinction, scattering, extinction - scattering, back, asymmetry)))
 
 
-def amplitudes(
+def amplitude_functions(
     radius: float, index: complex, host: float, wavelength: float, angle: ArrayLike
 ) -> tuple[ComplexArray, ComplexArray]:
-    """Amplitudes S1 (across the scattering plane) and S2 (in it) at scattering angles.
+    """Scattering amplitudes S1 (across the scattering plane) and S2 (in it) at scattering angles.
 
     The differential cross-section is |S|^2 / k^2, k the wavenumber in the host.
 
     Parameters
     ----------
     radius, index, host, wavelength
-        As in `coefficients`.
+        As in `mie_coefficients`.
     angle : (t,) float64, radians
         From the forward direction.
 
     Returns
     -------
     S1, S2 : (t,) complex128
+
+    Raises
+    ------
+    ValueError
+        As in `coefficients`, or if an angle is not finite.
     """
-    a, b = coefficients(radius, index, host, wavelength)
-    cosine = np.cos(np.atleast_1d(np.asarray(angle, np.float64)))
+    a, b = mie_coefficients(radius, index, host, wavelength)
+    cosine = np.cos(np.atleast_1d(checked_angles(angle, "Scattering angle")))
     pi, tau = _angular(cosine, len(a))
     n = np.arange(1, len(a) + 1)
     weight = (2 * n + 1) / (n * (n + 1))

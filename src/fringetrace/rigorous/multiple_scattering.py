@@ -1,4 +1,4 @@
-"""Multiple scattering of many cylinders: what all others send to each, solved for."""
+"""Multiple scattering between many cylinders: the linear system of exciting amplitudes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fringetrace.core import Array, ComplexArray, FloatArray
-from fringetrace.rigorous.cylindrical_waves import waves
+from fringetrace.rigorous.cylindrical_waves import outgoing_waves
 
 _DENSE = 400  # unknowns up to which elimination is as quick as iteration
 _FEW = 16  # centres that are never taken for a lattice
@@ -65,7 +65,7 @@ def solve(
 def _coupling(centres: FloatArray, k: float, weight: FloatArray, sources: ComplexArray) -> ComplexArray:
     """The dense matrix of G S in scaled unknowns, rows (cylinder j, order n), columns (l, m)."""
     count = weight.shape[-1]
-    wave = waves(centres[:, None] - centres, k, count - 1)
+    wave = outgoing_waves(centres[:, None] - centres, k, count - 1)
     order = np.arange(count)
     block = wave[:, :, order - order[:, None] + count - 1]  # j, l, n, m
     block /= weight[:, None, :, None]
@@ -103,7 +103,7 @@ def _convolution(
     nearest = (1.0 - _ON_GRID) * apart.min()
     lag = np.stack(np.meshgrid(*lags, indexing="ij"), -1) * steps
     lag[np.hypot(*np.moveaxis(lag, -1, 0)) < nearest] = 0.0  # between places of which one is empty
-    kernel = fft.fft2(waves(lag, k, count - 1), axes=(0, 1))
+    kernel = fft.fft2(outgoing_waves(lag, k, count - 1), axes=(0, 1))
     order = np.arange(count)
     kernel = np.ascontiguousarray(kernel[..., order - order[:, None] + count - 1])
     at = tuple(places.T)

@@ -1,4 +1,4 @@
-"""How far rays can be believed on round parts: their size in waves, and the error that rays make there."""
+"""Validity of ray optics for round parts: size parameter, phase across, expected error."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fringetrace.rigorous.cylindrical_waves import Index, at_wavelength
+from fringetrace.rigorous.cylindrical_waves import Index, indices_at
 
 # Laws of rays against the rigorous answer, k a = 8 to 250, fitted in docs/rigorous.md
 _OPAQUE = 2.4  # over k a: light that two conducting discs reflect
@@ -18,7 +18,7 @@ _ROUGH, _NONE = 0.1, 0.5  # errors from which rays are a rough model, and none
 
 @dataclass(frozen=True)
 class Validity:
-    """What rays are worth on a rod or a sphere.
+    """Validity of ray optics for a rod or a sphere.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Validity:
 
     @property
     def attributes(self) -> dict[str, float | str]:
-        """The same for a table's attributes."""
+        """The numbers and the verdict as attributes of a table."""
         return {
             "size_parameter": self.size_parameter, "phase_across_rad": self.phase,
             "ray_error": self.ray_error, "validity": str(self),
@@ -50,7 +50,7 @@ class Validity:
 
 
 def validity(radius: float, wavelength: float, index: Index, host: Index = 1.0) -> Validity:
-    """How far rays can be believed on a round part of a scene.
+    """Validity of ray optics for a round part of a scene.
 
     The error is that of the coherent sum of rays in the far field, by laws measured against the rigorous
     answer (docs/rigorous.md): 2.4 / (k a) for light reflected off opaque rods, 3 / sqrt(k a) for clear ones,
@@ -77,7 +77,7 @@ def validity(radius: float, wavelength: float, index: Index, host: Index = 1.0) 
         raise ValueError(
             f"Validity: expected positive lengths in metres, got radius {radius}, wavelength {wavelength}"
         )
-    within, around = (complex(at_wavelength(v, np.asarray(wavelength))) for v in (index, host))
+    within, around = (complex(indices_at(v, np.asarray(wavelength))) for v in (index, host))
     size = 2.0 * math.pi * around.real * radius / wavelength
     phase = 2.0 * size * (within.real / around.real - 1.0)
     opaque = math.isinf(within.real) or math.exp(-8.0 * math.pi * within.imag * radius / wavelength) < _DARK

@@ -11,10 +11,10 @@ from .far_fields import far_field as far_field
 from .goniometer import (
     amplitudes as amplitudes,
     brdf as brdf,
+    brdf_sampling_error as brdf_sampling_error,
     reciprocity as reciprocity,
     rounding_error as rounding_error,
-    sampling_error as sampling_error,
 )
-from .illumination import Setup as Setup, footprint as footprint
-from .rod_lattice import Lattice as Lattice
-from .rod_studies import Polarised as Polarised, cluster as cluster, specular as specular, study as study
+from .illumination import Illumination as Illumination, footprint as footprint
+from .rod_lattice import RodLattice as RodLattice
+from .rod_studies import cluster as cluster, specular as specular, study as study

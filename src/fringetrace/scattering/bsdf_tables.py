@@ -1,4 +1,4 @@
-"""Tables of BRDFs: values between the entries, a sphere under one light, and files for renderers."""
+"""BSDF tables: interpolation, a sphere under one light, and Mitsuba files."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ SELDOM = 1e-3
 GRAZING = 1e-6
 
 
-def table(
+def brdf_table(
     values: npt.ArrayLike,
     theta_i: npt.ArrayLike,
     phi_i: npt.ArrayLike,
@@ -33,7 +33,7 @@ def table(
     phi_o: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
 ) -> DataArray:
-    """A BRDF f = dL_o / (L_i cos(theta_i) dOmega_i) with its axes.
+    """BRDF table f = dL_o / (L_i cos(theta_i) dOmega_i) with its axes.
 
     Parameters
     ----------
@@ -91,13 +91,13 @@ def _between(at: FloatArray, nodes: FloatArray) -> tuple[npt.NDArray[np.intp], F
 
 
 def lookup(brdf: DataArray, incident: npt.ArrayLike, outgoing: npt.ArrayLike) -> FloatArray:
-    """A tabulated BRDF between any two directions: linear in each angle, around the turn too.
+    """BRDF between the entries of a table: linear in each angle, periodic in azimuth.
 
     Parameters
     ----------
     brdf : xarray.DataArray
-        (theta_i, phi_i, theta_o, phi_o, anything), as of `table`. If phi_i is a single angle the surface is
-        isotropic: only phi_o - phi_i counts.
+        (theta_i, phi_i, theta_o, phi_o, anything), as of `brdf_table`. If phi_i is a single angle the surface
+        is isotropic: only phi_o - phi_i counts.
     incident, outgoing : (..., 3) array-like
         To the light and to the eye, unit vectors, z along the surface's normal.
 
@@ -138,8 +138,8 @@ def lookup(brdf: DataArray, incident: npt.ArrayLike, outgoing: npt.ArrayLike) ->
     return np.asarray(found * above[..., None])
 
 
-def sphere(brdf: DataArray, light: npt.ArrayLike = (0.0, 0.0, 1.0), pixels: int = 256) -> FloatArray:
-    """A sphere under one distant light, seen from far away along z: radiance over irradiance.
+def shaded_sphere(brdf: DataArray, light: npt.ArrayLike = (0.0, 0.0, 1.0), pixels: int = 256) -> FloatArray:
+    """Sphere with a BRDF under one distant light, seen along z: radiance over irradiance.
 
     Parameters
     ----------
@@ -189,7 +189,7 @@ def mitsuba(
     incidences: tuple[int, int] = (19, 37),
     name: str = "fringetrace",
 ) -> None:
-    """A file for the BSDF `measured` of Mitsuba 3, in its spectral variants.
+    """Write a BRDF for Mitsuba 3's plugin `measured` (spectral variants).
 
     That stores f cos(theta_o) against the half vector between light and eye, on a square of
     sqrt(theta_m) and phi_m (Dupuy and Jakob, ACM Trans. Graph. 37, 274 (2018)), with maps that say
@@ -200,7 +200,7 @@ def mitsuba(
     Parameters
     ----------
     brdf : xarray.DataArray
-        As of `table`, resampled by `lookup`; a single phi_i is an isotropic surface.
+        As of `brdf_table`, resampled by `lookup`; a single phi_i is an isotropic surface.
     path : path
         The file is there in full or not at all.
     pixels : int, at least 2

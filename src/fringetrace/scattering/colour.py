@@ -1,4 +1,4 @@
-"""Spectra to colour: CIE illuminants and observers, XYZ, Lab, sRGB; measured spectra in and out."""
+"""Colorimetry: CIE illuminants and observers, spectrum to XYZ, Lab and sRGB; measured spectra as files."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from fringetrace.core import (
     Array,
     FloatArray,
     FringetraceWarning,
+    filled,
     nm,
     read_csv as load,
     um,
@@ -21,12 +22,12 @@ from fringetrace.core import (
 )
 
 __all__ = [
-    "chromaticity", "illuminant", "lab", "load", "luminance", "observer", "samples", "save", "srgb",
-    "weights", "white", "xyz",
+    "chromaticity", "illuminant", "lab", "load", "luminance", "observer", "resolving_wavelengths", "save",
+    "srgb", "weights", "white", "xyz",
 ]  # fmt: skip
 
 # A lamp by name, or as wavelengths (metres) and relative power.
-Light = str | tuple[npt.ArrayLike, npt.ArrayLike]
+Illuminant = str | tuple[npt.ArrayLike, npt.ArrayLike]
 
 # The CIE's observers run from 360 to 830 nm; lamps are tabulated every 5 nm. One step of zeros at both
 # ends makes the trapezium rule the CIE's plain sum.
@@ -57,7 +58,7 @@ def _colour() -> Any:
 
 def _checked(wavelengths: npt.ArrayLike) -> FloatArray:
     """Wavelengths in nm, once they are known to be increasing and to cover what is seen."""
-    found = np.asarray(wavelengths, dtype=np.float64) / nm
+    found = filled(wavelengths) / nm
     if found.ndim != 1 or len(found) < 4:
         raise ValueError(f"wavelengths: expected shape (n,) with n of at least 4, got {found.shape}")
     if not (np.isfinite(found).all() and (np.diff(found) > 0.0).all()):
@@ -98,8 +99,8 @@ def _tabulated(name: str) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def illuminant(light: Light, wavelengths: npt.ArrayLike) -> FloatArray:
-    """Relative spectral power of a lamp, 100 at 560 nm for those of the CIE, per wavelength.
+def illuminant(light: Illuminant, wavelengths: npt.ArrayLike) -> FloatArray:
+    """Relative spectral power of an illuminant; those of the CIE are 100 at 560 nm.
 
     Parameters
     ----------
@@ -119,9 +120,9 @@ def illuminant(light: Light, wavelengths: npt.ArrayLike) -> FloatArray:
     ValueError
         If the name is unknown, or the table is none.
     """
-    at = np.asarray(wavelengths, dtype=np.float64)
+    at = filled(wavelengths)
     if not isinstance(light, str):
-        own, power = (np.asarray(part, dtype=np.float64) for part in light)
+        own, power = (filled(part) for part in light)
         if own.ndim != 1 or own.shape != power.shape or not (np.diff(own) > 0.0).all() or power.min() < 0.0:
             raise ValueError("illuminant: expected increasing wavelengths and as many powers, none negative")
         return np.interp(at, own, power, left=0.0, right=0.0)
@@ -151,7 +152,7 @@ def observer(degrees: int, wavelengths: npt.ArrayLike) -> FloatArray:
     if degrees not in OBSERVERS:
         raise ValueError(f"observer: expected 2 or 10 degrees, got {degrees!r}")
     table = _colour().MSDS_CMFS[OBSERVERS[degrees]]
-    at = np.asarray(wavelengths, dtype=np.float64) / nm
+    at = filled(wavelengths) / nm
     columns = [np.interp(at, table.wavelengths, column, left=0.0, right=0.0) for column in table.values.T]
     return np.stack(columns, axis=-1)
 
@@ -177,7 +178,7 @@ def _spread(points: FloatArray, values: FloatArray, samples: FloatArray) -> Floa
     return weights
 
 
-def _sums(samples: FloatArray, light: Light | None, degrees: int) -> FloatArray:
+def _sums(samples: FloatArray, light: Illuminant | None, degrees: int) -> FloatArray:
     """(n, 3): samples (nm) times these add up to the integrals of x, y, z times light, over nm."""
     inside = samples[(samples > FIRST) & (samples < LAST)]
     points = np.union1d(np.arange(FIRST - STEP, LAST + 2.0 * STEP, STEP), inside)
@@ -187,8 +188,8 @@ def _sums(samples: FloatArray, light: Light | None, degrees: int) -> FloatArray:
     return _spread(points, observer(degrees, points * nm) * (widths * power)[:, None], samples)
 
 
-def weights(wavelengths: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2) -> FloatArray:
-    """Tristimulus weights: X, Y, Z of a reflectance are its samples times these.
+def weights(wavelengths: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
+    """Tristimulus weights: X, Y, Z are the samples of a reflectance times these.
 
     The integral is a sum over the CIE's 5 nm and all samples together (trapezium rule); between its
     samples a reflectance is Lagrange's cubic (as in ASTM E2022), beyond them it keeps its last value
@@ -219,7 +220,7 @@ def weights(wavelengths: npt.ArrayLike, illuminant: Light = "D65", observer: int
     return np.asarray(sums / brightness)
 
 
-def samples(path: float = 0.0) -> FloatArray:
+def resolving_wavelengths(path: float = 0.0) -> FloatArray:
     """Wavelengths that resolve the fringes of an optical path difference.
 
     Parameters
@@ -261,9 +262,9 @@ def _warn(values: FloatArray, samples: FloatArray, weights: FloatArray) -> None:
 
 
 def xyz(
-    reflectance: npt.ArrayLike, wavelengths: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2
+    reflectance: npt.ArrayLike, wavelengths: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2
 ) -> FloatArray:
-    """Tristimulus values of reflectances (or transmittances): what reflects everything has Y = 1.
+    """CIE XYZ of reflectances (or transmittances); a perfect reflector has Y = 1.
 
     Of a BRDF in 1/sr give pi times it, for white is the Lambertian 1/pi. See `weights` for the integral.
 
@@ -291,7 +292,7 @@ def xyz(
         If samples do not follow from their neighbours: steps of wavelength have to be well below
         lambda^2 / D, D being the optical path difference, else fringes alias.
     """
-    values = np.asarray(reflectance, dtype=np.float64)
+    values = filled(reflectance)
     found = _checked(wavelengths)
     if values.ndim == 0 or values.shape[-1] != len(found):
         raise ValueError(f"reflectance: expected shape (..., {len(found)}), got {values.shape}")
@@ -304,13 +305,13 @@ def xyz(
     return np.asarray(values @ sums)
 
 
-def white(illuminant: Light = "D65", observer: int = 2) -> FloatArray:
-    """XYZ of what reflects all of the light of a lamp: (3,) float64, with Y = 1."""
-    return np.asarray(weights(samples(), illuminant, observer).sum(axis=0))
+def white(illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
+    """CIE XYZ of the white point of an illuminant: (3,) float64, with Y = 1."""
+    return np.asarray(weights(resolving_wavelengths(), illuminant, observer).sum(axis=0))
 
 
 def luminance(radiance: npt.ArrayLike, wavelengths: npt.ArrayLike, observer: int = 2) -> FloatArray:
-    """Luminance of a spectral radiance, absolute: 683 lm/W times the integral with y.
+    """Luminance of a spectral radiance in cd/m^2: 683 lm/W times its integral with y.
 
     Parameters
     ----------
@@ -325,11 +326,11 @@ def luminance(radiance: npt.ArrayLike, wavelengths: npt.ArrayLike, observer: int
         Of a spectral irradiance, W/(m^2 m): lux.
     """
     sums = _sums(_checked(wavelengths), None, observer)[:, 1]
-    return np.asarray(EFFICACY * nm * (np.asarray(radiance, dtype=np.float64) @ sums))
+    return np.asarray(EFFICACY * nm * (filled(radiance) @ sums))
 
 
 def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
-    """CIE x, y of X, Y, Z.
+    """CIE chromaticity x, y of X, Y, Z.
 
     Parameters
     ----------
@@ -339,14 +340,14 @@ def chromaticity(xyz: npt.ArrayLike) -> FloatArray:
     -------
     (..., 2) float64, NaN for black
     """
-    values = np.asarray(xyz, dtype=np.float64)
+    values = filled(xyz)
     total = values.sum(axis=-1, keepdims=True)
     lit = total > 0.0
     return np.where(lit, values[..., :2] / np.where(lit, total, 1.0), np.nan)
 
 
-def lab(xyz: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2) -> FloatArray:
-    """CIE 1976 L*a*b*.
+def lab(xyz: npt.ArrayLike, illuminant: Illuminant = "D65", observer: int = 2) -> FloatArray:
+    """CIE 1976 L*a*b* of X, Y, Z.
 
     Parameters
     ----------
@@ -362,8 +363,8 @@ def lab(xyz: npt.ArrayLike, illuminant: Light = "D65", observer: int = 2) -> Flo
     return np.asarray(colour.XYZ_to_Lab(np.asarray(xyz), chromaticity(white(illuminant, observer))))
 
 
-def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Light = "D65") -> FloatArray:
-    """Colours on an sRGB screen (IEC 61966-2-1).
+def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Illuminant = "D65") -> FloatArray:
+    """Screen colours (sRGB, IEC 61966-2-1) of X, Y, Z, with a choice of gamut mapping.
 
     Parameters
     ----------
@@ -383,7 +384,7 @@ def srgb(xyz: npt.ArrayLike, gamut: str = "clip", illuminant: Light = "D65") -> 
     """
     if gamut not in GAMUTS:
         raise ValueError(f"gamut: expected one of {', '.join(GAMUTS)}, got {gamut!r}")
-    colour, values = _colour(), np.asarray(xyz, dtype=np.float64)
+    colour, values = _colour(), filled(xyz)
     if illuminant != "D65":
         seen, shown = white(illuminant), white("D65")
         adaptation = colour.adaptation.matrix_chromatic_adaptation_VonKries(seen, shown, transform="Bradford")

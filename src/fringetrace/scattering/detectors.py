@@ -1,4 +1,4 @@
-"""Where a goniometer looks: cones about directions, cells of a hemisphere, pixels at a distance.
+"""Far-field detectors of a goniometer: cones, cells of the hemisphere, pixels at a distance.
 
 Directions are position angles: theta from +z, the sample's normal, towards +x (towards phi about z
 from +x). Light that comes from (theta, phi) is mirrored to (-theta, phi).
@@ -15,12 +15,12 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
+from fringetrace.geometry import IndexArray
 from fringetrace.scene import CCD
 from fringetrace.tracing import Fate, Paths, project
 
-IndexArray = npt.NDArray[np.int64]
 # Of each direction: which paths arrive, and their optical lengths in metres.
-Arrivals = Iterator[tuple[IndexArray, FloatArray]]
+DirectionPaths = Iterator[tuple[IndexArray, FloatArray]]
 
 
 def towards(theta: npt.ArrayLike, phi: npt.ArrayLike) -> FloatArray:
@@ -40,7 +40,7 @@ def towards(theta: npt.ArrayLike, phi: npt.ArrayLike) -> FloatArray:
 
 
 def sides(axis: npt.ArrayLike, phi: npt.ArrayLike, travel: float = 1.0) -> FloatArray:
-    """Unit vectors of s and p light along an axis of a goniometer: s is horizontal, p = direction x s.
+    """Polarisation vectors of s and p light along goniometer directions: s is horizontal, p = direction x s.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def sides(axis: npt.ArrayLike, phi: npt.ArrayLike, travel: float = 1.0) -> Float
 
 
 def checked_angles(angles: npt.ArrayLike, what: str, most: float | None = None) -> FloatArray:
-    """Angles as an array, once they are known to be some.
+    """Checked finite angles as an array, radians.
 
     Parameters
     ----------
@@ -90,26 +90,26 @@ def checked_angles(angles: npt.ArrayLike, what: str, most: float | None = None) 
 
 
 class Detector(Protocol):
-    """Directions, a grid theta x phi, and what falls into each of them."""
+    """Protocol of detectors: a grid theta x phi of directions, and the paths that each accepts."""
 
     @property
     def theta(self) -> FloatArray:
-        """(a,) float64, radians, from the normal."""
+        """Polar angles from the normal, (a,) float64, radians."""
 
     @property
     def phi(self) -> FloatArray:
-        """(b,) float64, radians, about the normal."""
+        """Azimuths about the normal, (b,) float64, radians."""
 
     @property
     def solid_angle(self) -> FloatArray:
-        """(theta, phi) float64, sr: what each direction accepts."""
+        """Accepted solid angle of each direction, (theta, phi) float64, sr."""
 
     @property
     def projected(self) -> FloatArray:
-        """(theta, phi) float64, sr: the same, weighted with cos(theta)."""
+        """Projected solid angle of each direction, weighted with cos(theta), (theta, phi) float64, sr."""
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
-        """Direction by direction, theta-major: numbers of the paths that arrive, and their lengths."""
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
+        """Paths that arrive in each direction (theta-major), and their optical path lengths."""
 
 
 def _exits(paths: Paths) -> IndexArray:
@@ -118,7 +118,7 @@ def _exits(paths: Paths) -> IndexArray:
 
 
 def far_lengths(paths: Paths, rows: IndexArray, centre: FloatArray, direction: FloatArray) -> FloatArray:
-    """Optical paths up to the plane through a centre, across a direction: the phase of the far field.
+    """Optical path lengths to the plane through a centre, normal to a direction: far-field phase.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def far_lengths(paths: Paths, rows: IndexArray, centre: FloatArray, direction: F
 
 @dataclass(frozen=True, eq=False)
 class Cones:
-    """Far field in circular cones about directions.
+    """Detector of circular cones about directions in the far field.
 
     Parameters
     ----------
@@ -172,18 +172,18 @@ class Cones:
 
     @property
     def solid_angle(self) -> FloatArray:
-        """(theta, phi) float64, sr: 2 pi (1 - cos half_angle)."""
+        """Solid angle of each cone, 2 pi (1 - cos half_angle), (theta, phi) float64, sr."""
         angle = 4.0 * np.pi * np.sin(0.5 * self.half_angle) ** 2
         return np.full((len(self.theta), len(self.phi)), angle)
 
     @property
     def projected(self) -> FloatArray:
-        """(theta, phi) float64, sr: pi sin^2(half_angle) cos(theta)."""
+        """Projected solid angle of each cone, pi sin^2(half_angle) cos(theta), (theta, phi) float64, sr."""
         disc = np.pi * np.sin(self.half_angle) ** 2 * np.cos(self.theta)
         return np.repeat(disc[:, None], len(self.phi), axis=1)
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
-        """See `Detector`; a ray may be in several cones, or in none."""
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
+        """Paths in each cone, see `Detector`; a path may be in several cones, or in none."""
         rows = _exits(paths)
         direction = paths.direction[rows]
         chord = 2.0 * np.sin(0.5 * self.half_angle)  # 1 - cos would lose the digits of narrow cones
@@ -194,7 +194,7 @@ class Cones:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Far field on the whole upper hemisphere, in cells of equal steps of theta and phi.
+    """Detector of the upper hemisphere, in cells of equal steps of theta and phi.
 
     Parameters
     ----------
@@ -226,16 +226,16 @@ class Cells:
 
     @property
     def solid_angle(self) -> FloatArray:
-        """(theta, phi) float64, sr; they add up to 2 pi."""
+        """Solid angle of each cell, (theta, phi) float64, sr; their sum is 2 pi."""
         return self._rings(np.cos(np.linspace(0.0, 0.5 * np.pi, self.rings + 1)))
 
     @property
     def projected(self) -> FloatArray:
-        """(theta, phi) float64, sr; they add up to pi."""
+        """Projected solid angle of each cell, (theta, phi) float64, sr; their sum is pi."""
         return self._rings(0.5 * np.sin(np.linspace(0.0, 0.5 * np.pi, self.rings + 1)) ** 2)
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
-        """See `Detector`; each ray that leaves upwards is in one cell."""
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
+        """Paths in each cell, see `Detector`; each path that leaves upwards is in one cell."""
         rows = _exits(paths)
         x, y, z = paths.direction[rows].T
         up = z > 0.0
@@ -252,7 +252,7 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Pixels:
-    """One square pixel for each direction, at a distance from the sample's centre and facing it.
+    """Detector of one square pixel per direction, at a distance from the sample's centre and facing it.
 
     It adds the amplitudes of all rays that fall on it, with their lengths as they arrive; it blocks
     none of them.
@@ -283,16 +283,16 @@ class Pixels:
 
     @property
     def solid_angle(self) -> FloatArray:
-        """(theta, phi) float64, sr: width^2 / distance^2."""
+        """Solid angle of each pixel, width^2 / distance^2, (theta, phi) float64, sr."""
         return np.full((len(self.theta), len(self.phi)), (self.width / self.distance) ** 2)
 
     @property
     def projected(self) -> FloatArray:
-        """(theta, phi) float64, sr: the same times cos(theta)."""
+        """Projected solid angle of each pixel, (theta, phi) float64, sr."""
         return self.solid_angle * np.cos(self.theta)[:, None]
 
-    def arrivals(self, paths: Paths, centre: FloatArray) -> Arrivals:
-        """See `Detector`; a ray may fall on several pixels, or on none."""
+    def arrivals(self, paths: Paths, centre: FloatArray) -> DirectionPaths:
+        """Paths on each pixel, see `Detector`; a path may fall on several pixels, or on none."""
         met = paths.bounces > 0
         for theta in self.theta:
             for phi in self.phi:
@@ -306,8 +306,8 @@ class Pixels:
         return CCD(centre + self.distance * axis, -axis, up, self.width, (1, 1))
 
 
-def everything(paths: Paths, detector: Detector, centre: FloatArray) -> Arrivals:
-    """All paths that met something and left, towards each direction of a detector: Fraunhofer's sum.
+def fraunhofer_paths(paths: Paths, detector: Detector, centre: FloatArray) -> DirectionPaths:
+    """All paths that met something and left, for each direction of a detector (Fraunhofer sum).
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What leaves a sample that is lit from one direction: rays traced once, and summed at a detector."""
+"""Far field of a sample lit from one direction: one trace, summed at a detector."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from fringetrace.core import ComplexArray, FloatArray, checked_wavelengths
 from fringetrace.field import TOLERANCE, spectrum
-from fringetrace.scattering.detectors import Detector, Pixels, everything, sides, towards
-from fringetrace.scattering.illumination import Setup
+from fringetrace.scattering.detectors import Detector, Pixels, fraunhofer_paths, sides, towards
+from fringetrace.scattering.illumination import Illumination
 from fringetrace.scene import Beam, Scene
 from fringetrace.tracing import Fate, Paths, Rays, needs, stream
 
@@ -22,7 +22,7 @@ CHUNK = 2**17
 
 @dataclass(frozen=True, eq=False)
 class Far:
-    """What left a sample that was lit from one direction.
+    """Far field of a sample lit from one direction.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ def _bands(scene: Scene, waves: FloatArray) -> list[tuple[float | None, slice]]:
 class _Adding:
     """How paths are added up at a detector."""
 
-    setup: Setup
+    lighting: Illumination
     detector: Detector
     method: str
     wanted: npt.NDArray[np.bool_]
@@ -77,13 +77,13 @@ class _Adding:
         self, paths: Paths, start: float, waves: FloatArray
     ) -> tuple[ComplexArray, FloatArray, npt.NDArray[np.int64]]:
         """Amplitudes (theta, phi, parts, wavelength), powers and numbers (theta, phi) of some paths."""
-        size, centre = self.wanted.shape, np.asarray(self.setup.centre)
+        size, centre = self.wanted.shape, np.asarray(self.lighting.centre)
         total = np.zeros((self.wanted.size, parts(paths.source), len(waves)), dtype=np.complex128)
         power, count = np.zeros(self.wanted.size), np.zeros(self.wanted.size, dtype=np.int64)
         unit = 1.0 if paths.area is None else paths.area
         arrivals = self.detector.arrivals(paths, centre)
         if self.method == "diffraction":
-            arrivals = everything(paths, self.detector, centre)
+            arrivals = fraunhofer_paths(paths, self.detector, centre)
         since = 0.0 if isinstance(self.detector, Pixels) else start
         for i, (rows, length) in enumerate(arrivals):
             count[i], power[i] = len(rows), unit * (np.abs(paths.amplitude[rows]) ** 2).sum()
@@ -107,12 +107,12 @@ class _Adding:
 
 
 def parts(source: Beam | Rays) -> int:
-    """How many amplitudes light has: one, or those of s and p."""
+    """Number of field components: one for scalar light, two (s and p) for polarised light."""
     return 1 if source.polarisation is None else 2
 
 
 def mean(fars: Sequence[Far]) -> Far:
-    """Light of several states that do not interfere: the mean of what left.
+    """Mean far field of mutually incoherent states of light.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def mean(fars: Sequence[Far]) -> Far:
 
 
 def far_field(
-    setup: Setup,
+    lighting: Illumination,
     theta: float,
     phi: float,
     detector: Detector,
@@ -152,11 +152,11 @@ def far_field(
     tolerance: float = TOLERANCE,
     threads: int | None = None,
 ) -> Far:
-    """Trace one incidence, and sum what arrives at a detector.
+    """Far field of one incidence: trace the sample once, sum the paths at a detector.
 
     Parameters
     ----------
-    setup : Setup
+    lighting : Illumination
     theta, phi : float, radians
         Where the light comes from.
     detector : Cones, Cells or Pixels
@@ -164,7 +164,7 @@ def far_field(
     method, max_bounces, min_amplitude, max_reflections, half_wave_loss, tolerance, threads
         See `brdf`.
     jones : (2,) complex, optional
-        Amplitudes of s and p of the light, see `Setup.light`.
+        Amplitudes of s and p of the light, see `Illumination.light`.
     chosen : (theta, phi) bool, optional
         The directions whose amplitudes are wanted; the others stay 0. Default: all.
 
@@ -174,17 +174,17 @@ def far_field(
     """
     waves, size = checked_wavelengths(wavelengths), (len(detector.theta), len(detector.phi))
     wanted = np.ones(size, dtype=bool) if chosen is None else chosen
-    source = setup.light(theta, phi, jones)
+    source = lighting.light(theta, phi, jones)
     total = np.zeros((*size, parts(source), len(waves)), dtype=np.complex128)
     power, count = np.zeros((*size, len(waves))), np.zeros(size, dtype=np.int64)
     shares, incident = np.zeros(len(FATES)), 0.0
-    bands = _bands(setup.scene, waves)
-    adding = _Adding(setup, detector, method, wanted & (method != "power"), half_wave_loss, tolerance)
+    bands = _bands(lighting.scene, waves)
+    adding = _Adding(lighting, detector, method, wanted & (method != "power"), half_wave_loss, tolerance)
     for wavelength, band in bands:
-        start = setup.start(source, wavelength)
+        start = lighting.start(source, wavelength)
         for paths in stream(
-            setup.scene, source, wavelength=wavelength, max_bounces=max_bounces, min_amplitude=min_amplitude,
-            threads=threads, chunk=CHUNK,
+            lighting.scene, source, wavelength=wavelength, max_bounces=max_bounces,
+            min_amplitude=min_amplitude, threads=threads, chunk=CHUNK,
         ):  # fmt: skip
             shares, incident = shares + _shares(paths), incident + paths.ledger().incident
             most = paths if max_reflections is None else paths.where(paths.reflections <= max_reflections)

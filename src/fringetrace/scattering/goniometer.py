@@ -1,4 +1,4 @@
-"""BRDF: light from one direction goes into another, at any wavelengths; one trace an incidence."""
+"""BRDF of a sample over angles and wavelengths, from one trace per incidence."""
 
 from __future__ import annotations
 
@@ -11,9 +11,15 @@ import numpy.typing as npt
 
 from fringetrace.accuracy import hit_error
 from fringetrace.core import FloatArray, FringetraceWarning, array, checked_wavelengths
+from fringetrace.optics import PolarisationLike, jones_states
 from fringetrace.scattering.detectors import Cells, Cones, Detector, Pixels, checked_angles
 from fringetrace.scattering.far_fields import FATES, Far, far_field, mean
-from fringetrace.scattering.illumination import Polarisation, Setup, Source, footprint, states, worth
+from fringetrace.scattering.illumination import (
+    Illumination,
+    SourceFunction,
+    footprint,
+    scene_validity,
+)
 from fringetrace.scene import Scene
 from fringetrace.tracing import Fate, needs, trace
 
@@ -23,15 +29,15 @@ if TYPE_CHECKING:
 __all__ = [
     "Cells",
     "Cones",
+    "Illumination",
     "Pixels",
-    "Setup",
     "amplitudes",
     "brdf",
+    "brdf_sampling_error",
     "far_field",
     "footprint",
     "reciprocity",
     "rounding_error",
-    "sampling_error",
 ]
 
 # Rays along y and x, unless asked for others; and those that are followed in longer numbers.
@@ -55,12 +61,12 @@ def _check_method(method: str, detector: Detector) -> None:
         raise ValueError("method: expected 'rays' or 'power' with Pixels, got 'diffraction'")
 
 
-def _check_spacing(setup: Setup, waves: FloatArray) -> None:
+def _check_spacing(lighting: Illumination, waves: FloatArray) -> None:
     """Fraunhofer's sum over a grid of rays has orders of the grid, unless it is fine."""
-    if setup.source is not None:
+    if lighting.source is not None:
         return
-    assert setup.aperture is not None
-    sides = zip(setup.aperture, setup.rays[::-1], strict=True)
+    assert lighting.aperture is not None
+    sides = zip(lighting.aperture, lighting.rays[::-1], strict=True)
     spacing = max((side / count for side, count in sides if count > 1), default=0.0)
     if spacing > 0.5 * waves.min():
         warnings.warn(
@@ -109,11 +115,11 @@ def amplitudes(
     aperture: tuple[float, float] | None = None,
     rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
-    source: Source | None = None,
-    polarisation: Polarisation = None,
+    source: SourceFunction | None = None,
+    polarisation: PolarisationLike = None,
     **options: Any,
 ) -> DataArray:
-    """Complex sums of what goes from each direction into each: the BRDF before it is squared.
+    """Complex far-field amplitudes from each direction into each: the BRDF before squaring.
 
     Parameters
     ----------
@@ -135,13 +141,13 @@ def amplitudes(
     theta, phi = _angles(incidence)
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
-    setup = Setup(scene, aperture, rays, centre, source)
-    lights = states(polarisation, (len(theta), len(phi)))
+    lighting = Illumination(scene, aperture, rays, centre, source)
+    lights = jones_states(polarisation, (len(theta), len(phi)), "goniometer")
     if len(lights[0]) > 1:
         raise ValueError(f"amplitudes polarisation: expected one state of light, got {polarisation!r}")
     pairs = [(t, p) for t in theta for p in phi]
     fars = [
-        far_field(setup, *pair, detector, waves, method=method, jones=jones, **options)
+        far_field(lighting, *pair, detector, waves, method=method, jones=jones, **options)
         for pair, (jones,) in zip(pairs, lights, strict=True)
     ]
     sums = np.reshape([far.amplitude for far in fars], (len(theta), len(phi), *fars[0].amplitude.shape))
@@ -163,13 +169,13 @@ def brdf(
     aperture: tuple[float, float] | None = None,
     rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
-    source: Source | None = None,
-    polarisation: Polarisation = None,
+    source: SourceFunction | None = None,
+    polarisation: PolarisationLike = None,
     reciprocal: bool = False,
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> DataArray:
-    """Bidirectional reflectance distribution function, radiance over incident irradiance.
+    """Bidirectional reflectance distribution function (BRDF), radiance over incident irradiance.
 
     One trace an incidence serves all directions and all wavelengths; where media are dispersive, absorb,
     or have films, it is one trace a wavelength. Light that meets nothing is left
@@ -193,7 +199,7 @@ def brdf(
         a wavelength apart. "power": powers add, the mean over what is accepted; the same at all
         wavelengths.
     aperture, rays, centre, source
-        See `Setup`.
+        See `Illumination`.
     polarisation : None, "s", "p", "unpolarised", or (2,) or (a, b, 2) complex
         None: light of one number a ray, with the amplitudes of light whose field lies along each
         boundary. Else s lies across the plane of light and normal (at angle 0: across that of `phi`),
@@ -238,11 +244,11 @@ def brdf(
     theta, phi = _angles(incidence)
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
-    setup = Setup(scene, aperture, rays, centre, source)
+    lighting = Illumination(scene, aperture, rays, centre, source)
     if method == "diffraction":
-        _check_spacing(setup, waves)
+        _check_spacing(lighting, waves)
     pairs = [(t, p) for t in theta for p in phi]
-    lights = states(polarisation, (len(theta), len(phi)))
+    lights = jones_states(polarisation, (len(theta), len(phi)), "goniometer")
     if reciprocal:
         _check_same(theta, phi, detector)
         if polarisation is not None and len(lights[0]) == 1:
@@ -252,7 +258,7 @@ def brdf(
     for i, (t, p) in enumerate(pairs):
         chosen = order >= i if reciprocal else None
         each = [
-            far_field(setup, t, p, detector, waves, method=method, jones=jones, chosen=chosen, **options)
+            far_field(lighting, t, p, detector, waves, method=method, jones=jones, chosen=chosen, **options)
             for jones in lights[i]
         ]
         fars.append(mean(each))
@@ -264,7 +270,7 @@ def brdf(
         later = np.tri(len(pairs), k=-1, dtype=bool)
         square[later] = square.transpose(1, 0, 2)[later]
     table = _table(values, fars, theta, phi, detector, waves, method)
-    return table.assign_attrs(worth(scene, float(waves.max())).attributes)
+    return table.assign_attrs(scene_validity(scene, float(waves.max())).attributes)
 
 
 def _table(
@@ -299,7 +305,7 @@ def _check_same(theta: FloatArray, phi: FloatArray, detector: Detector) -> None:
 
 
 def reciprocity(table: DataArray) -> float:
-    """How far a BRDF is from f(i, o) = f(o, i) (Helmholtz), as a part of its largest value.
+    """Reciprocity error of a BRDF: deviation from f(i, o) = f(o, i), relative to its maximum.
 
     It holds for whole samples, lit to beyond their edges, and for parts of even ones; not for pixels
     at a finite distance, nor for what rays miss between them.
@@ -328,8 +334,8 @@ def reciprocity(table: DataArray) -> float:
     return float(np.abs(values - other).max()) / top if top else 0.0
 
 
-def sampling_error(table: DataArray, scene: Scene, detector: Detector, **options: Any) -> float:
-    """How far a BRDF changes if half the rays are taken either way, at the middle one of its incidences.
+def brdf_sampling_error(table: DataArray, scene: Scene, detector: Detector, **options: Any) -> float:
+    """Sampling error of a BRDF: relative change with half the rays either way, at its middle incidence.
 
     An estimate of what the table is off, where rays are many enough that twice as many change it less.
 
@@ -357,7 +363,7 @@ def sampling_error(table: DataArray, scene: Scene, detector: Detector, **options
 
 
 def rounding_error(scene: Scene, theta: float, wavelength: float, **options: Any) -> float:
-    """What rounding in float64 costs the light that leaves a sample, see `budget.hit_error`.
+    """Rounding error of the optical paths of light that leaves a sample, in waves; see `hit_error`.
 
     Parameters
     ----------
@@ -375,7 +381,7 @@ def rounding_error(scene: Scene, theta: float, wavelength: float, **options: Any
     known = {name: options[name] for name in ("aperture", "centre", "source") if name in options}
     limits: dict[str, Any] = {"max_bounces": 100, "min_amplitude": 1e-6}
     limits |= {name: options[name] for name in limits if name in options}
-    setup = Setup(scene, rays=(1, PROBES), **known)
+    lighting = Illumination(scene, rays=(1, PROBES), **known)
     at = None if needs(scene) is None else wavelength
-    paths = trace(scene, setup.light(theta, 0.0), wavelength=at, record=True, **limits)
+    paths = trace(scene, lighting.light(theta, 0.0), wavelength=at, record=True, **limits)
     return hit_error(paths.where((paths.fate == Fate.LEFT) & (paths.bounces > 0)), wavelength)

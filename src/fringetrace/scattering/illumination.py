@@ -1,4 +1,4 @@
-"""What lights a sample under a goniometer: a rectangle of its plane, from any direction."""
+"""Illumination of a goniometer's sample: a plane wave over a rectangle, from any direction."""
 
 from __future__ import annotations
 
@@ -8,61 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_length
+from fringetrace.core import FloatArray, checked_length
 from fringetrace.geometry import breadth
 from fringetrace.rigorous import CONDUCTOR, Index, Validity, validity
 from fringetrace.scattering.detectors import sides, towards
 from fringetrace.scene import Beam, Scene
 from fringetrace.tracing import Rays, launch
 
-Source = Callable[[float, float], Beam | Rays]
-# None: light of one number a ray. A name, or amplitudes of s and p, one pair or one an incidence.
-Polarisation = str | npt.ArrayLike | None
-# Amplitudes of s and p; of several the powers' mean is taken.
-NAMED = {"s": ((1, 0),), "p": ((0, 1),), "unpolarised": ((1, 0), (0, 1))}
+SourceFunction = Callable[[float, float], Beam | Rays]
 
 
-def states(polarisation: Polarisation, shape: tuple[int, int]) -> list[tuple[ComplexArray | None, ...]]:
-    """States of light whose powers make up a polarisation, for each incidence.
-
-    Parameters
-    ----------
-    polarisation : None, "s", "p", "unpolarised", or (2,) or (theta, phi, 2) complex
-    shape : (theta, phi)
-        Counts of incidences.
-
-    Returns
-    -------
-    list of tuples of (2,) complex128, or None for light of one number a ray
-        Amplitudes of s and p; an incidence after the other, theta-major.
-
-    Raises
-    ------
-    ValueError
-        For another name or shape, numbers that are not finite, or amplitudes that are both 0.
-    """
-    count = shape[0] * shape[1]
-    if polarisation is None:
-        return [(None,)] * count
-    if isinstance(polarisation, str):
-        if polarisation not in NAMED:
-            raise ValueError(
-                f"goniometer polarisation: expected {', '.join(NAMED)} or amplitudes, got {polarisation!r}"
-            )
-        return [tuple(np.array(one, np.complex128) for one in NAMED[polarisation])] * count
-    given = np.asarray(polarisation, dtype=np.complex128)
-    if given.shape not in ((2,), (*shape, 2)):
-        raise ValueError(
-            f"goniometer polarisation: expected amplitudes of s and p of shape (2,) or {(*shape, 2)}, "
-            f"got {given.shape}"
-        )
-    if not (np.isfinite(given).all() and given.any(axis=-1).all()):
-        raise ValueError("goniometer polarisation: expected finite amplitudes, not both 0, got others")
-    return [(one,) for one in np.broadcast_to(given, (*shape, 2)).reshape(-1, 2)]
-
-
-def worth(scene: Scene, wavelength: float) -> Validity:
-    """What rays are worth on the smallest part of a scene, taken for a rod; see `fringetrace.validity`.
+def scene_validity(scene: Scene, wavelength: float) -> Validity:
+    """Validity of ray optics for the smallest part of a scene, taken for a rod; see `fringetrace.validity`.
 
     Parameters
     ----------
@@ -95,7 +52,7 @@ def footprint(
     reach: float,
     jones: npt.ArrayLike | None = None,
 ) -> Rays:
-    """A plane wave whose rays cross the plane through the sample's centre in the same grid at any angle.
+    """Plane wave whose rays cross the plane through the sample's centre in the same grid at any angle.
 
     Parameters
     ----------
@@ -129,8 +86,8 @@ def footprint(
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
-    """A sample under a goniometer: what is lit, about which centre.
+class Illumination:
+    """Sample of a goniometer: its scene, the lit rectangle and the phase centre.
 
     Parameters
     ----------
@@ -156,7 +113,7 @@ class Setup:
     aperture: tuple[float, float] | None = None
     rays: tuple[int, int] = (256, 256)
     centre: npt.ArrayLike | None = None
-    source: Source | None = None
+    source: SourceFunction | None = None
 
     def __post_init__(self) -> None:
         low, high = self.bounds
@@ -170,12 +127,12 @@ class Setup:
 
     @property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Lowest and highest corner of the box around the sample, (3,) float64, metres."""
+        """Bounding box of the sample, (3,) float64 lower and upper corner, metres."""
         boxes = np.stack([surface.mesh.bounds for surface in self.scene.surfaces])
         return boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
 
     def light(self, theta: float, phi: float, jones: npt.ArrayLike | None = None) -> Beam | Rays:
-        """What falls on the sample from one direction.
+        """Light on the sample from one direction.
 
         Parameters
         ----------
@@ -202,7 +159,7 @@ class Setup:
         return footprint(theta, phi, self.aperture, self.rays, np.asarray(self.centre), reach, jones)
 
     def start(self, source: Beam | Rays, wavelength: float | None = None) -> float:
-        """Optical path of parallel light from its start to the plane through the centre, across it.
+        """Optical path of parallel light from its start to the plane through the centre, normal to it.
 
         Parameters
         ----------

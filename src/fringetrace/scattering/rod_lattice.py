@@ -1,4 +1,4 @@
-"""Lattices of rods: where they stand, of what, and how tracers and rigorous methods see them."""
+"""Rod lattices: positions, materials, and their scenes for ray tracing and rigorous solvers."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ MEDIA = ("rod", "host")
 
 
 @dataclass(frozen=True)
-class Lattice:
-    """Rods along y in rows across z, the topmost row highest.
+class RodLattice:
+    """Lattice of rods along y, in rows across z, the top row highest.
 
     Without a host they stand in a vacuum. A host fills the half-space below a front face; in the scene
     it ends half a pitch beside the rods, at black walls.
@@ -107,12 +107,12 @@ class Lattice:
 
     @property
     def gap(self) -> float:
-        """Distance of the rows, metres."""
+        """Distance between rows, metres."""
         return ARRANGEMENTS[self.arrangement][0] * self.pitch if self.spacing is None else self.spacing
 
     @property
     def centres(self) -> FloatArray:
-        """(columns * rows, 2) float64, metres: x and z of the axes, column by column, about the origin."""
+        """Rod axes (x, z) about the origin, column by column, (columns * rows, 2) float64, metres."""
         column, row = (
             i.ravel() for i in np.meshgrid(*map(np.arange, (self.columns, self.rows)), indexing="ij")
         )
@@ -124,7 +124,7 @@ class Lattice:
 
     @property
     def channels(self) -> FloatArray:
-        """((columns - 1) * (rows - 1), 2) float64, metres: channels, each amid four rods; or none."""
+        """Positions (x, z) of air channels, each amid four rods, metres; or none."""
         if self.channel is None:
             return np.zeros((0, 2))
         grid = self.centres.reshape(self.columns, self.rows, 2)
@@ -138,12 +138,12 @@ class Lattice:
 
     @property
     def mesh(self) -> Mesh:
-        """The rods, as `shapes.rod_lattice` has them; `shapes.rod_of_triangle` tells which is which."""
+        """Mesh of the rods, see `shapes.rod_lattice`; `shapes.rod_of_triangle` numbers its triangles."""
         return _prisms(self, self.centres, self.radius, f"{self.arrangement} lattice")
 
     @property
     def scene(self) -> Scene:
-        """The rods as mirrors or as matter; channels, front face and walls of the host."""
+        """Scene of the lattice: rods as mirrors or of matter; channels, front face and walls of the host."""
         self._check_apart()
         inside = {} if self.rod is None else {"front": self.host, "back": self.rod}
         kind = Mirror(self.reflectance) if self.rod is None else Dielectric()
@@ -157,14 +157,14 @@ class Lattice:
 
     @property
     def lighting(self) -> dict[str, Any]:
-        """What `goniometer.brdf` needs besides the scene: aperture and centre on a host's front face."""
+        """Arguments of `goniometer.brdf` besides the scene: aperture and centre on a host's front face."""
         if self.host is None:
             return {}
         return {"aperture": self.footprint, "centre": (_across(self)[0], 0.0, self.front)}
 
     @property
     def footprint(self) -> tuple[float, float]:
-        """Width along x and length along y that are lit, metres: the host's face, or the box around rods."""
+        """Lit width along x and length along y, metres: of the host's face, or the box around rods."""
         width, length = _across(self)[1], self.length
         if self.host is not None:
             return width + self.pitch, length + self.pitch
@@ -173,15 +173,15 @@ class Lattice:
 
     @property
     def cylinders(self) -> Cylinders:
-        """The same for `fringetrace.rigorous.cylinders`, x and z there x and y; the host without end."""
+        """The rods as `rigorous.Cylinders`, x and z there x and y; the host is infinite."""
         count = len(self.centres), len(self.channels)
         radii = np.repeat([self.radius, self.channel or 0.0], count)
         index = [self._index] * count[0] + [1.0] * count[1]
         return Cylinders(np.concatenate([self.centres, self.channels]), radii, index, self._around)
 
     @property
-    def endless(self) -> cylinder_gratings.Lattice:
-        """The same for `fringetrace.rigorous.cylinder_gratings`, with rows that never end, on the host.
+    def endless(self) -> cylinder_gratings.CylinderGratings:
+        """The rows as a `rigorous.cylinder_gratings` lattice, infinite along x, on the host.
 
         Raises
         ------
@@ -203,10 +203,12 @@ class Lattice:
                 cylinder_gratings.Row(float(d), self.channel, 1.0, 0.5 * (1.0 + shift) * self.pitch)
                 for d in 0.5 * (depth[1:] + depth[:-1])
             ]
-        return cylinder_gratings.Lattice(self.pitch, float(depth[0]) + 2.0 * self.radius, rows, self._around)
+        return cylinder_gratings.CylinderGratings(
+            self.pitch, float(depth[0]) + 2.0 * self.radius, rows, self._around
+        )
 
     def validity(self, wavelength: float) -> Validity:
-        """What rays are worth on one of the rods, see `fringetrace.rigorous.ray_validity`.
+        """Validity of ray optics for one rod, see `fringetrace.validity`.
 
         Parameters
         ----------
@@ -234,7 +236,7 @@ class Lattice:
             Cylinders(np.concatenate([self.centres, self.channels]), radii, 1.0)
 
 
-def _prisms(lattice: Lattice, centres: FloatArray, radius: float, name: str) -> Mesh:
+def _prisms(lattice: RodLattice, centres: FloatArray, radius: float, name: str) -> Mesh:
     """Rods about axes (n, 2), rod after rod."""
     rod = rod_lattice(1, 1, radius, lattice.pitch, lattice.length, sides=lattice.sides)
     offset = np.insert(centres, 1, 0.0, axis=1)
@@ -244,7 +246,7 @@ def _prisms(lattice: Lattice, centres: FloatArray, radius: float, name: str) -> 
 
 
 def _surfaces(
-    lattice: Lattice, centres: FloatArray, radius: float, kind: Mirror | Dielectric,
+    lattice: RodLattice, centres: FloatArray, radius: float, kind: Mirror | Dielectric,
     media: dict[str, Any], name: str,
 ) -> list[Surface]:  # fmt: skip
     """Rods as one surface, or as true cylinders, one surface each, open at their ends."""
@@ -259,14 +261,14 @@ def _surfaces(
     ]
 
 
-def _across(lattice: Lattice) -> tuple[float, float]:
+def _across(lattice: RodLattice) -> tuple[float, float]:
     """Middle and width of the rods along x, metres."""
     x = lattice.centres[:, 0]
     low, high = x.min() - lattice.radius, x.max() + lattice.radius
     return float(0.5 * (low + high)), float(high - low)
 
 
-def _half_space(lattice: Lattice) -> list[Surface]:
+def _half_space(lattice: RodLattice) -> list[Surface]:
     """The host's front face, and black walls down to below the rods."""
     x, (width, length) = _across(lattice)[0], lattice.footprint
     low = float(lattice.centres[:, 1].min()) - lattice.radius

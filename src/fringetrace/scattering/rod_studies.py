@@ -1,4 +1,4 @@
-"""Lattices of rods, ordered and disordered, and how their BRDF changes with their parameters."""
+"""Parameter studies of rod lattices: BRDF by rays, by multiple scattering, and as a multilayer."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import FloatArray, array, checked_wavelengths, degree, grid, sweep
-from fringetrace.rigorous import Polarisation, differential_width, scatter, spectrum
+from fringetrace.optics import Polarisation, PolarisationName
+from fringetrace.rigorous import differential_width, reflectance_spectrum, scatter
 from fringetrace.scattering.detectors import Cones, checked_angles
 from fringetrace.scattering.far_fields import FATES
 from fringetrace.scattering.goniometer import AXES, METHODS, brdf
-from fringetrace.scattering.rod_lattice import MEDIA, Lattice as Lattice
+from fringetrace.scattering.rod_lattice import MEDIA, RodLattice as RodLattice
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -24,43 +25,42 @@ if TYPE_CHECKING:
     from fringetrace.optics import Material
 
 
-Polarised = Polarisation | Literal["unpolarised"]
 # Surfaces that light may meet, and the least amplitude of a branch.
 BOUNCES, FAINT = 100, 1e-3
 # Materials by name and by index at the wavelengths: names alone do not tell them apart.
 Media = Mapping[tuple[str | None, bytes], "Material"]
-# The field along the rods, as the goniometer says it; s light has the amplitudes of one number a ray.
-ALONG = {"E": None, "H": "p", "unpolarised": "unpolarised"}
+# As the goniometer traces it: s light stays s across rods, and one number a ray has its amplitudes.
+TRACED = {"s": None, "p": "p", "unpolarised": "unpolarised"}
 
 
 def _cell(
     theta_i: npt.ArrayLike, theta_o: npt.ArrayLike, half_angle: float, wavelengths: npt.ArrayLike,
-    method: str, polarisation: Polarised, rays: int, max_bounces: int, min_amplitude: float,
+    method: str, polarisation: PolarisationName, rays: int, max_bounces: int, min_amplitude: float,
     indices: npt.NDArray[np.complex128], media: Media, **parameters: Any,
 ) -> dict[str, FloatArray]:  # fmt: skip
     """One lattice: its BRDF in the plane across the rods, and where the power went."""
     found = {name: media.get(_known(parameters[name], at)) for name, at in zip(MEDIA, indices, strict=True)}
-    lattice = Lattice(**parameters | found)
+    lattice = RodLattice(**parameters | found)
     if method == "rods":
         values = cluster(lattice, theta_i, theta_o, wavelengths, polarisation)
         unknown = np.full((len(values), 1), np.nan)
         return {"brdf": values[:, None, :, None], **dict.fromkeys(FATES, unknown)}
     table = brdf(
         lattice.scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths, method=method,
-        polarisation=ALONG[polarisation], rays=(1, rays), max_bounces=max_bounces,
+        polarisation=TRACED[polarisation], rays=(1, rays), max_bounces=max_bounces,
         min_amplitude=min_amplitude, threads=1, **lattice.lighting,
     )  # fmt: skip
     return {"brdf": table.values, **{name: table[name].values for name in FATES}}
 
 
 def cluster(
-    lattice: Lattice,
+    lattice: RodLattice,
     theta_i: npt.ArrayLike,
     theta_o: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
-    polarisation: Polarised = "E",
+    polarisation: PolarisationName = "s",
 ) -> FloatArray:
-    """BRDF of a lattice in the plane across its rods, by rigorous multiple scattering.
+    """BRDF of a finite lattice in the plane across its rods, by rigorous multiple scattering.
 
     f = (length / wavelength) (d sigma / d theta) / (width cos theta_i cos theta_o): rods of a length of
     many waves send d sigma / d theta into a lobe that is wavelength / length wide along them, and its
@@ -74,8 +74,8 @@ def cluster(
     theta_i, theta_o : (n,) radians
         Position angles, outside of the host.
     wavelengths : (w,) float64, metres
-    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
-        The field along the rods; the mean of both.
+    polarisation : ``"s"``, ``"p"`` or ``"unpolarised"``
+        The electric field along the rods, or across them; the mean of both.
 
     Returns
     -------
@@ -109,20 +109,20 @@ def _through(host: float, angle: FloatArray, polarisation: Polarisation) -> tupl
     """Angles inside of a host, and the parts of the power that pass its face."""
     inside = np.arcsin(np.sin(angle) / host)
     here, there = np.cos(angle), host * np.cos(inside)
-    if polarisation == "H":
+    if polarisation == "p":
         here, there = here * host, there / host
     return inside, 4.0 * here * there / (here + there) ** 2
 
 
 def specular(
-    lattice: Lattice,
+    lattice: RodLattice,
     theta_i: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
     *,
     method: str = "rods",
-    polarisation: Polarised = "unpolarised",
+    polarisation: PolarisationName = "unpolarised",
 ) -> DataArray:
-    """What a lattice of rows that never end reflects, rigorously or as a multilayer.
+    """Specular reflectance of a lattice with infinite rows, rigorously or as a multilayer.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def specular(
         From where, outside of the host.
     wavelengths : (w,) float64, metres
     method, polarisation
-        See `lattices.spectrum`.
+        See `lattices.reflectance_spectrum`.
 
     Returns
     -------
@@ -143,10 +143,10 @@ def specular(
     Raises
     ------
     ValueError
-        As `Lattice.endless` and `lattices.spectrum`.
+        As `Lattice.endless` and `lattices.reflectance_spectrum`.
     """
     start, waves = checked_angles(theta_i, "specular theta_i"), checked_wavelengths(wavelengths)
-    found = spectrum(lattice.endless, waves, start[:, None], polarisation, method)
+    found = reflectance_spectrum(lattice.endless, waves, start[:, None], polarisation, method)
     axes = ("theta_i", "wavelength")
     coordinates = {
         "theta_i": ("theta_i", start, {"units": "rad"}),
@@ -159,16 +159,16 @@ def specular(
         "method": method,
         "polarisation": polarisation,
     }
-    attributes |= believed([lattice], waves)
+    attributes |= validity_attributes([lattice], waves)
     return array(found.reflectance, axes, coordinates, "reflectance", attributes)
 
 
-def believed(kinds: Sequence[Lattice], waves: FloatArray) -> dict[str, float | str]:
-    """What rays are worth on the smallest of some rods, at the longest of some wavelengths: attributes."""
+def validity_attributes(kinds: Sequence[RodLattice], waves: FloatArray) -> dict[str, float | str]:
+    """Validity attributes for the smallest of some rods at the longest of some wavelengths."""
     return min((kind.validity(waves.max()) for kind in kinds), key=lambda v: v.size_parameter).attributes
 
 
-def _spoken(lattice: Lattice) -> dict[str, Any]:
+def _spoken(lattice: RodLattice) -> dict[str, Any]:
     """Parameters of a lattice, materials by name."""
     return vars(lattice) | {
         name: medium.name for name in MEDIA if (medium := getattr(lattice, name)) is not None
@@ -180,14 +180,14 @@ def _known(name: str | None, indices: npt.NDArray[np.complex128]) -> tuple[str |
     return name, np.asarray(indices, np.complex128).tobytes()
 
 
-def _indices(lattice: Lattice, waves: FloatArray) -> npt.NDArray[np.complex128]:
+def _indices(lattice: RodLattice, waves: FloatArray) -> npt.NDArray[np.complex128]:
     """Of rod and host at each wavelength, 0 for none."""
     media = [getattr(lattice, name) for name in MEDIA]
     return np.array([np.zeros(len(waves)) if medium is None else medium.index(waves) for medium in media])
 
 
 def study(
-    lattice: Lattice,
+    lattice: RodLattice,
     axes: Mapping[str, Sequence[Any]],
     theta_i: npt.ArrayLike,
     theta_o: npt.ArrayLike,
@@ -195,21 +195,21 @@ def study(
     *,
     half_angle: float = 1.0 * degree,
     method: str = "rays",
-    polarisation: Polarised = "E",
+    polarisation: PolarisationName = "s",
     rays: int = 2000,
     max_bounces: int = BOUNCES,
     min_amplitude: float = FAINT,
     folder: str | os.PathLike[str] | None = None,
     **sweeping: Any,
 ) -> DataArray:
-    """BRDF of many lattices in the plane across their rods.
+    """BRDF of lattices over combinations of parameters, in the plane across their rods.
 
     Parameters
     ----------
     lattice : Lattice
         What stays the same.
     axes : dict of sequences
-        Values of each parameter that changes, by the names of `Lattice`; every combination is traced.
+        Values of each parameter that changes, by the names of `RodLattice`; every combination is traced.
     theta_i, theta_o : (n,) radians
         From where and to where, see `goniometer.brdf`.
     wavelengths : (w,) float64, metres
@@ -219,8 +219,8 @@ def study(
         See `goniometer.brdf`; or "rods": the rigorous answer in the same unit, see `cluster`. It has no
         use for half angle, rays and bounces, and does not say where the power went (NaN). For endless
         rows, and as a multilayer, see `specular`.
-    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
-        The field along the rods; the mean of both takes twice the time.
+    polarisation : ``"s"``, ``"p"`` or ``"unpolarised"``
+        The electric field along the rods, or across them; the mean of both takes twice the time.
     rays : int
         Across the lattice.
     min_amplitude : float
@@ -238,16 +238,16 @@ def study(
     Raises
     ------
     ValueError
-        For a parameter that a lattice does not have, and as `Lattice` and `goniometer.brdf`.
+        For a parameter that a lattice does not have, and as `RodLattice` and `goniometer.brdf`.
     """
-    known = [field.name for field in fields(Lattice)]
+    known = [field.name for field in fields(RodLattice)]
     for name in axes:
         if name not in known:
             raise ValueError(f"lattice study: expected parameters among {', '.join(known)}, got {name!r}")
     if method not in (*METHODS, "rods"):
         raise ValueError(f"lattice study method: expected {', '.join(METHODS)} or rods, got {method!r}")
-    if polarisation not in ALONG:
-        raise ValueError(f"lattice study polarisation: expected {', '.join(ALONG)}, got {polarisation!r}")
+    if polarisation not in TRACED:
+        raise ValueError(f"lattice study polarisation: expected {', '.join(TRACED)}, got {polarisation!r}")
     incidence, waves = checked_angles(theta_i, "lattice study theta_i"), checked_wavelengths(wavelengths)
     observation = checked_angles(theta_o, "lattice study theta_o")
     fixed = {
@@ -266,7 +266,7 @@ def study(
     cells = [_spoken(kind) | fixed | {"indices": each} for kind, each in zip(kinds, indices, strict=True)]
     done = sweep(partial(_cell, media=media), cells, folder, **sweeping)
     attributes = {"method": method, "polarisation": polarisation, "half_angle_rad": half_angle}
-    attributes |= believed(kinds, waves) | {
+    attributes |= validity_attributes(kinds, waves) | {
         f"lattice_{name}": int(value) if isinstance(value, bool) else value
         for name, value in _spoken(lattice).items()
         if name not in axes and value is not None

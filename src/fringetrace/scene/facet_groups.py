@@ -1,4 +1,4 @@
-"""Groups of coplanar facets that reflect one plane wave."""
+"""Groups of coplanar facets, each of which reflects one plane wave."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ import numpy.typing as npt
 from fringetrace.core import Array, FloatArray
 from fringetrace.geometry import weld
 from fringetrace.optics import Metal
+from fringetrace.scene.coplanar import planes
 from fringetrace.scene.model import Scene, Surface
 
-# Normals and heights of facets this near (relative to the mesh) are those of one plane.
-COPLANAR = 1e-9
 
-
-def parted(scene: Scene) -> list[npt.NDArray[np.int64]]:
-    """Which triangles of each surface are one: those in a plane, those that hang together on a form.
+def group_facets(scene: Scene) -> list[npt.NDArray[np.int64]]:
+    """Facet groups of each surface: facets of one plane, or connected facets on a form.
 
     Parameters
     ----------
@@ -56,14 +54,7 @@ def _parts(surface: Surface) -> npt.NDArray[np.int64]:
     elif getattr(surface.interface, "waves", "plane") != "plane":
         flat[:] = False
     parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
-    a, b, c = np.moveaxis(mesh.vertices[mesh.faces[flat]], 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    size = float(np.ptp(mesh.bounds, axis=0).max())
-    height = np.einsum("ij,ij->i", normal, a - mesh.bounds.mean(axis=0)) / size
-    # off the middle between round numbers, where most designs have their planes
-    rounded = np.floor(np.column_stack([normal, height]) / COPLANAR + 0.377).astype(np.int64)
-    parts[flat] = np.unique(rounded, axis=0, return_inverse=True)[1].ravel()
+    parts[flat] = planes(mesh.vertices[mesh.faces[flat]])
     return parts
 
 

@@ -1,4 +1,4 @@
-"""The nouns of a scene, checked once, at the door: Surface, Beam, CCD, Scene."""
+"""Surfaces and the scene that they make."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _medium(value: Any, what: str) -> Material | None:
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """A mesh and what it does to light.
+    """Surface of a scene: mesh, interface, exact form and the media on both sides.
 
     Parameters
     ----------
@@ -70,12 +70,12 @@ class Surface:
 
     @property
     def boundary(self) -> bool:
-        """Whether it parts two media."""
+        """Whether the surface separates two media."""
         return isinstance(self.interface, (Dielectric, Metal))
 
     @property
     def element(self) -> Element | None:
-        """The thin element that it is, if it is one."""
+        """Thin element of the surface, or None."""
         return cast("Element", self.interface) if hasattr(self.interface, "act") else None
 
     def _check_media(self) -> None:
@@ -89,7 +89,7 @@ class Surface:
             raise ValueError(f"{self.name}: expected a medium in front of a {kind} or behind it, got none")
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Surface:
-        """The surface, mesh, interface and form, turned about the origin, then shifted; as `Mesh.moved`.
+        """Surface (mesh, interface, form) rotated about the origin, then shifted; as `Mesh.moved`.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Surfaces that light meets.
+    """Scene: the surfaces that light meets, and the surrounding medium.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class Scene:
 
     @property
     def around(self) -> Material:
-        """The medium around the surfaces."""
+        """Medium around the surfaces."""
         if self.medium is not None:
             return self.medium
         from fringetrace.optics import VACUUM
@@ -154,7 +154,7 @@ class Scene:
 
     @property
     def digits(self) -> tuple[tuple[int, bool], ...]:
-        """Surface and branch (whether transmitted) for which each digit of a path key stands, from 1 on.
+        """Surface and branch (whether transmitted) of each digit of a path key, from 1 on.
 
         Two for each surface; then one for each further branch of elements with several.
         """
@@ -167,7 +167,7 @@ class Scene:
         return (*plain, *further)
 
     def index(self, name: str) -> int:
-        """Position of the surface called `name`.
+        """Number of the surface called `name`.
 
         Parameters
         ----------

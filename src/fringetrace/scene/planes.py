@@ -4,28 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from fringetrace.core import FloatArray
+from fringetrace.core import (
+    FloatArray,
+)
 
-if TYPE_CHECKING:
-    pass
-
-
-Axes = tuple[FloatArray, FloatArray, FloatArray]
+PlaneAxes = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def checked_positive(value: float, what: str) -> float:
-    """Return a length in metres, or refuse what is not finite and positive."""
+    """Checked finite positive length in metres."""
     if not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
         raise ValueError(f"{what}: expected a positive length in metres, got {value!r}")
     return float(value)
 
 
 def checked_size(size: Any, what: str) -> tuple[float, float]:
-    """Return (width, height) in metres, or refuse what is not two positive lengths."""
+    """Checked (width, height), two positive lengths in metres."""
     sides = tuple(size) if isinstance(size, Iterable) else (size,)
     if len(sides) != 2:
         raise ValueError(f"{what} size: expected (width, height) in metres, got {size!r}")
@@ -33,7 +31,7 @@ def checked_size(size: Any, what: str) -> tuple[float, float]:
 
 
 def checked_grid(shape: Any, what: str) -> tuple[int, int]:
-    """Return (rows, columns), or refuse what is not two positive whole numbers."""
+    """Checked (rows, columns), two positive whole numbers."""
     grid = tuple(shape) if isinstance(shape, Iterable) else (shape,)
     if len(grid) != 2 or not all(isinstance(n, (int, np.integer)) and n > 0 for n in grid):
         raise ValueError(f"{what}: expected two positive whole numbers (rows, columns), got {shape!r}")

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import ROUNDED, ComplexArray, FloatArray, checked_direction, checked_vector, frame
-from fringetrace.scene.planes import Axes, checked_grid, checked_positive, checked_size
-
-if TYPE_CHECKING:
-    pass
+from fringetrace.core import (
+    ComplexArray,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    frame,
+)
+from fringetrace.optics import checked_jones
+from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive, checked_size
 
 
 @dataclass(frozen=True)
 class Gaussian:
-    """Gaussian beam profile, brightest at the centre: amplitude exp(-r^2 / waist^2).
+    """Gaussian beam profile: amplitude exp(-r^2 / waist^2).
 
     Parameters
     ----------
@@ -44,7 +47,7 @@ Profile = Callable[[FloatArray, FloatArray], FloatArray]
 
 
 def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
-    """Names of surfaces, given as one or as several.
+    """Tuple of surface names, from one name or several.
 
     Parameters
     ----------
@@ -57,20 +60,9 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _checked_jones(value: Any) -> ComplexArray:
-    try:
-        vector = np.array(value, dtype=np.complex128)
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
-    size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
-    if not (np.isfinite(size) and size > 0.0):
-        raise ValueError(f"Beam polarisation: expected a Jones vector of two numbers, got {value!r}")
-    return vector if abs(size - 1.0) <= ROUNDED else vector / size
-
-
 @dataclass(frozen=True, eq=False)
 class Beam:
-    """A collimated coherent beam: a plane wave, launched as a grid of parallel rays.
+    """Collimated coherent beam: a plane wave, launched as a grid of parallel rays.
 
     Parameters
     ----------
@@ -106,7 +98,7 @@ class Beam:
     profile: Profile | None = None
     passes: tuple[str, ...] = ()
     polarisation: ComplexArray | None = None
-    axes: Axes = field(init=False, repr=False)  # of columns, rows, and the direction
+    axes: PlaneAxes = field(init=False, repr=False)  # of columns, rows, and the direction
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Beam centre"))
@@ -119,9 +111,9 @@ class Beam:
             raise TypeError(f"Beam profile: expected None or a function of (x, y), got {self.profile!r}")
         object.__setattr__(self, "passes", as_names(self.passes))
         if self.polarisation is not None:
-            object.__setattr__(self, "polarisation", _checked_jones(self.polarisation))
+            object.__setattr__(self, "polarisation", checked_jones(self.polarisation, "Beam"))
 
     @property
     def area(self) -> float:
-        """Area of the beam that one ray stands for, m^2."""
+        """Beam area per ray, m^2."""
         return self.size[0] * self.size[1] / (self.shape[0] * self.shape[1])

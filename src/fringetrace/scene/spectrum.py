@@ -1,4 +1,4 @@
-"""Light of several wavelengths: spectra, spectral lines, and how far they stay coherent.
+"""Spectrum of the light: wavelengths, spectral lines and their degree of coherence.
 
 Wavelengths do not interfere with each other: what a camera records is the sum over them. The complex
 degree of coherence between two waves whose paths differ by D is g(D) = sum of w exp(2 pi i D / wavelength)
@@ -14,7 +14,7 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, nm
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, filled, nm
 
 # What the sum over a line may be off its integral, relative to the line.
 ERROR = 1e-6
@@ -24,7 +24,7 @@ MOST = 4096
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Wavelengths and how much of the light each has.
+    """Spectrum: wavelengths and the share of the light that each has.
 
     Parameters
     ----------
@@ -44,9 +44,7 @@ class Spectrum:
     weights: FloatArray
 
     def __post_init__(self) -> None:
-        wavelengths, weights = (
-            np.atleast_1d(np.array(v, np.float64)) for v in (self.wavelengths, self.weights)
-        )
+        wavelengths, weights = (np.atleast_1d(filled(v).copy()) for v in (self.wavelengths, self.weights))
         if wavelengths.ndim != 1 or not wavelengths.size or wavelengths.shape != weights.shape:
             raise ValueError(
                 f"Spectrum: expected as many wavelengths as weights, at least one, got shapes "
@@ -60,7 +58,7 @@ class Spectrum:
         object.__setattr__(self, "weights", weights / weights.sum())
 
     def coherence(self, path: npt.ArrayLike) -> ComplexArray:
-        """Complex degree of coherence of two waves.
+        """Complex degree of coherence of two waves over their path difference.
 
         Parameters
         ----------
@@ -77,7 +75,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Line:
-    """A spectral line, Gaussian over the wavenumber.
+    """Spectral line, Gaussian over the wavenumber.
 
     Its coherence is |g(D)| = exp(-(pi D width / centre^2)^2 / (4 ln 2)), one half at
     D = (2 ln 2 / pi) centre^2 / width (Born and Wolf, Principles of Optics, ch. 7.5.8).
@@ -116,17 +114,17 @@ class Line:
 
     @property
     def length(self) -> float:
-        """Path difference at which the coherence has fallen to one half, metres."""
+        """Coherence length: path difference at which the coherence has fallen to one half, metres."""
         return 2.0 * math.log(2.0) / math.pi * self.centre**2 / self.width
 
     def coherence(self, path: npt.ArrayLike) -> ComplexArray:
-        """Complex degree of coherence of two waves, in closed form; see `Spectrum.coherence`."""
+        """Complex degree of coherence over the path difference, in closed form; see `Spectrum.coherence`."""
         away = np.asarray(path, dtype=np.float64)
         turns = np.exp(2j * np.pi * np.fmod(away / self.centre, 1.0))
         return np.asarray(turns * np.exp(-2.0 * (math.pi * self.spread * away) ** 2), dtype=np.complex128)
 
     def sampled(self, path: float, error: float = ERROR) -> Spectrum:
-        """The line as a sum over wavelengths that holds up to a path difference.
+        """Spectrum of wavelengths that represents the line up to a path difference.
 
         Equal steps of wavenumber (the trapezoidal rule). A sum in steps of h repeats itself at a path
         difference of 1 / h: what it is off at D is the line's coherence at 1 / h - D, and what lies beyond

@@ -1,4 +1,4 @@
-"""Values of a TOML file become what they stand for, by the types of parameters."""
+"""Decoding of TOML values into objects, by the types of parameters."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from fringetrace.core import ComplexArray, FloatArray, parse_angle, parse_length, rotation
 from fringetrace.geometry import Mesh, meshes
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.optics import Material, materials
 from fringetrace.scenefile.schema import (
     Kind,
@@ -33,7 +33,7 @@ CALLABLE = get_origin(Callable[[], None])
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """How a thing is turned about the origin, and then shifted.
+    """Pose: rotation about the origin, then a shift.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ class Pose:
 
     @property
     def matrix(self) -> FloatArray | None:
-        """(3, 3) float64, or None."""
+        """Rotation matrix, (3, 3) float64, or None."""
         return self.turn if self.axis is None else rotation(self.axis, self.angle)
 
 
 def decode(value: Any, hint: Any, place: Place, unit: Unit = "") -> Any:
-    """What a TOML value stands for.
+    """Object that a TOML value stands for.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def _checked(make: Callable[[], Any], value: Mapping[str, Any], place: Place) ->
 
 
 def _recipe(value: dict[str, Any], place: Place) -> Recipe:
-    name, known = _named(value, None, kinds([Bench]), place)
+    name, known = _named(value, None, kinds([Interferometer]), place)
     rest = {key: item for key, item in value.items() if key != "type"}
     recipe = Recipe(name, _arguments(known, rest, place))
     _checked(lambda: recipe.bench, rest, place)

@@ -1,4 +1,4 @@
-"""Things become values that a TOML file can hold, by the types of their parameters."""
+"""Encoding of objects as TOML values, by the types of their parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from fringetrace.core import Array
 from fringetrace.geometry import Mesh, meshes
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.optics import Material, materials
 from fringetrace.scenefile.schema import Recipe, concrete, kinds, members, parameters
 from fringetrace.scenefile.toml import Path as Keys
@@ -24,7 +24,7 @@ Writer = Callable[[Path], None]
 
 
 class Shelf:
-    """Files that a scene file has beside it, before any of them is written.
+    """Companion files of a scene file, before any of them is written.
 
     Parameters
     ----------
@@ -39,20 +39,20 @@ class Shelf:
         self.files: dict[str, Writer] = {}
 
     def put(self, keys: Keys, suffix: str, write: Writer) -> dict[str, str]:
-        """One more file, and the reference to it."""
+        """Add a companion file; returns the reference to it."""
         name = f"{self.stem}.{'-'.join(map(str, keys))}{suffix}"
         self.files[name] = write
         return {"file": name}
 
     def refer(self, path: Path) -> str | None:
-        """How a file that there is already is referred to; None: not at all."""
+        """Reference to a file that exists already; None if there is none."""
         if self.outside or path.is_relative_to(self.folder):
             return Path(os.path.relpath(path, self.folder)).as_posix()
         return None
 
 
 def encode(value: Any, hint: Any, keys: Keys, shelf: Shelf) -> Any:
-    """What stands for a thing in a TOML file.
+    """TOML value of an object.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def _plain(value: Any) -> bool | int | float | str:
 
 def _kind(recipe: Recipe) -> Callable[..., Any]:
     """The function that a recipe names."""
-    return kinds([Bench])[recipe.name]
+    return kinds([Interferometer])[recipe.name]
 
 
 def _refused(value: Any, keys: Keys) -> ValueError:

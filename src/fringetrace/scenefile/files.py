@@ -1,4 +1,4 @@
-"""Scene files: a scene or a bench, its light and what is wanted of it, as TOML."""
+"""Scene files: a scene or an interferometer, its light and the wanted outputs, as TOML."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fringetrace.scenefile.encode import Shelf, encode
 from fringetrace.scenefile.schema import Recipe, parameters
 from fringetrace.scenefile.toml import Place, choice, dump, parse
 
-__all__ = ["OUTPUTS", "Recipe", "Setup", "load", "parsed", "save"]
+__all__ = ["OUTPUTS", "Experiment", "Recipe", "load", "parse_experiment", "save"]
 
 # What can be asked for; the second half takes a bench.
 OUTPUTS = (
@@ -29,8 +29,8 @@ FREE = ("surface", "beam", "ccd", "medium", "method", "max_bounces", "min_amplit
 
 
 @dataclass(frozen=True, eq=False)
-class Setup:
-    """What a scene file says.
+class Experiment:
+    """Contents of a scene file: scene or interferometer, beams, CCD, wavelengths, outputs.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Setup:
     def __post_init__(self) -> None:
         for wavelength in self.wavelengths:
             checked_wavelength(wavelength)
-        plain = {name: parameter.default for name, parameter in parameters(Setup).items()}
+        plain = {name: parameter.default for name, parameter in parameters(Experiment).items()}
         free = [
             name
             for name in FREE
@@ -96,12 +96,14 @@ class Setup:
 
     @cached_property
     def scene(self) -> Scene:
-        """The surfaces and what is around them."""
+        """Scene: the surfaces and the surrounding medium."""
         return Scene(self.surface, self.medium) if self.bench is None else self.bench.bench.scene
 
 
-def parsed(text: str, name: str, folder: str | os.PathLike[str], *, allow_outside: bool = False) -> Setup:
-    """A scene file's text, checked.
+def parse_experiment(
+    text: str, name: str, folder: str | os.PathLike[str], *, allow_outside: bool = False
+) -> Experiment:
+    """Parse and check the text of a scene file.
 
     Parameters
     ----------
@@ -116,7 +118,7 @@ def parsed(text: str, name: str, folder: str | os.PathLike[str], *, allow_outsid
 
     Returns
     -------
-    Setup
+    Experiment
 
     Raises
     ------
@@ -124,12 +126,12 @@ def parsed(text: str, name: str, folder: str | os.PathLike[str], *, allow_outsid
         If anything in it is not as expected; says file and line, key, what was expected and what was found.
     """
     document = parse(text, name)
-    setup: Setup = decode(document.values, Setup, Place(document, Path(folder), allow_outside))
-    return setup
+    experiment: Experiment = decode(document.values, Experiment, Place(document, Path(folder), allow_outside))
+    return experiment
 
 
-def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Setup:
-    """A scene or a bench from a TOML file. No code runs from it.
+def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Experiment:
+    """Load a scene or an interferometer from a TOML file; runs no code from it.
 
     Parameters
     ----------
@@ -139,32 +141,32 @@ def load(path: str | os.PathLike[str], *, allow_outside: bool = False) -> Setup:
 
     Returns
     -------
-    Setup
+    Experiment
 
     Raises
     ------
     OSError
         If the file cannot be read.
     ValueError
-        As in `parsed`.
+        As in `parse_experiment`.
     """
     file = Path(path)
     try:
         text = file.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
         raise ValueError(f"{path}: expected TOML in UTF-8, got other bytes: {error}") from None
-    return parsed(text, file.name, file.parent, allow_outside=allow_outside)
+    return parse_experiment(text, file.name, file.parent, allow_outside=allow_outside)
 
 
-def save(what: Setup | Scene, path: str | os.PathLike[str], *, allow_outside: bool = False) -> None:
-    """Write a scene file, which gives the same again, to the last bit.
+def save(what: Experiment | Scene, path: str | os.PathLike[str], *, allow_outside: bool = False) -> None:
+    """Save a scene file; loading it gives the same setup, to the last bit.
 
     Meshes that were loaded from a file in the same folder are referred to; others, and large arrays, are
     written beside it. All files are there in full or not at all.
 
     Parameters
     ----------
-    what : Setup or Scene
+    what : Experiment or Scene
     path : path
     allow_outside : bool
         Whether to refer to mesh files in other folders.
@@ -174,17 +176,17 @@ def save(what: Setup | Scene, path: str | os.PathLike[str], *, allow_outside: bo
     ValueError
         If something in it is no data, such as a profile that is a function of one's own.
     TypeError
-        If it is neither a Setup nor a Scene.
+        If it is neither an Experiment nor a Scene.
     OSError
         If the files cannot be written.
     """
     if isinstance(what, Scene):
-        what = Setup(surface=what.surfaces, medium=what.medium)
-    if not isinstance(what, Setup):
-        raise TypeError(f"scene file: expected a Setup or a Scene, got {type(what).__name__}")
+        what = Experiment(surface=what.surfaces, medium=what.medium)
+    if not isinstance(what, Experiment):
+        raise TypeError(f"scene file: expected an Experiment or a Scene, got {type(what).__name__}")
     target = Path(path)
     shelf = Shelf(target, allow_outside)
-    text = dump(encode(what, Setup, (), shelf))
+    text = dump(encode(what, Experiment, (), shelf))
     with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=target.parent) as folder:
         for name, write in shelf.files.items():
             write(Path(folder, name))

@@ -1,4 +1,4 @@
-"""A scene file run: traced, recorded, judged, and its outputs written."""
+"""Run of a scene file: trace, record, check, write the outputs."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from fringetrace.accuracy import checks
 from fringetrace.core import Array, ComplexArray, FloatArray, FringetraceWarning, nm, staged, tables
 from fringetrace.field import chosen, complex_field, irradiance
 from fringetrace.geometry import write_height_map
-from fringetrace.instruments import Bench, Mark, records, tiff
+from fringetrace.instruments import Interferometer, Mark, records, tiff
 from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.scenefile.files import Setup
+from fringetrace.scenefile.files import Experiment
 from fringetrace.tracing import Fate, Ledger, Paths, needs, trace
 from fringetrace.views import few
 
@@ -29,64 +29,64 @@ BLIND = ("paths.nc", "scene.png")
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """A setup, and its light as far as it was asked for.
+    """A setup with its lazily computed paths, images and fields.
 
     Parameters
     ----------
-    setup : Setup
+    experiment : Experiment
     """
 
-    setup: Setup
+    experiment: Experiment
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
     def kept(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """What is made once."""
+        """Value computed once and kept."""
         if key not in self.derived:
             self.derived[key] = make()
         return self.derived[key]
 
     @property
-    def bench(self) -> Bench | None:
-        """The ready bench, if it is one."""
-        return None if self.setup.bench is None else self.setup.bench.bench
+    def bench(self) -> Interferometer | None:
+        """The interferometer, if the setup is one."""
+        return None if self.experiment.bench is None else self.experiment.bench.bench
 
     @property
     def ccd(self) -> CCD:
-        """What records the light."""
-        found = self.setup.ccd if self.bench is None else self.bench.ccd
+        """CCD that records the light."""
+        found = self.experiment.ccd if self.bench is None else self.bench.ccd
         assert found is not None
         return found
 
     @property
     def beams(self) -> tuple[Beam, ...]:
-        """What lights the scene."""
-        return self.setup.beam if self.bench is None else (self.bench.beam,)
+        """Beams that light the scene."""
+        return self.experiment.beam if self.bench is None else (self.bench.beam,)
 
     @property
     def method(self) -> str:
-        """How arrivals become light on the pixels."""
-        return self.setup.method if self.bench is None else self.bench.method
+        """Method of the coherent sum on the pixels."""
+        return self.experiment.method if self.bench is None else self.bench.method
 
     def paths(self, wavelength: float) -> list[Paths]:
-        """The paths of each beam; traced anew where the scene depends on the wavelength."""
+        """Paths of each beam, traced per wavelength where the scene depends on it."""
         if self.bench is not None:
             self.image(wavelength)
             return [self.bench.trace()]
-        at = None if needs(self.setup.scene) is None else wavelength
+        at = None if needs(self.experiment.scene) is None else wavelength
         found: list[Paths] = self.kept(
-            ("paths", at), lambda: [self.traced(beam, self.setup.ccd, at) for beam in self.beams]
+            ("paths", at), lambda: [self.traced(beam, self.experiment.ccd, at) for beam in self.beams]
         )
         return found
 
     def traced(self, beam: Beam, ccd: CCD | None, wavelength: float | None, record: bool = False) -> Paths:
-        """A beam through the scene."""
+        """Trace one beam through the scene."""
         return trace(
-            self.setup.scene, beam, ccd, wavelength=wavelength, max_bounces=self.setup.max_bounces,
-            min_amplitude=self.setup.min_amplitude, record=record,
+            self.experiment.scene, beam, ccd, wavelength=wavelength, max_bounces=self.experiment.max_bounces,
+            min_amplitude=self.experiment.min_amplitude, record=record,
         )  # fmt: skip
 
     def image(self, wavelength: float) -> FloatArray:
-        """(rows, columns), |E|^2."""
+        """Irradiance |E|^2, (rows, columns)."""
 
         def find() -> FloatArray:
             if self.bench is None:
@@ -99,18 +99,18 @@ class Run:
         return found
 
     def field(self, wavelength: float) -> ComplexArray:
-        """(rows, columns) complex128, or (3, rows, columns) of light with a polarisation."""
+        """Complex field, (rows, columns) complex128, or (3, rows, columns) for polarised light."""
         if self.bench is not None:
             return self.bench.field(wavelength)
         return complex_field(self.paths(wavelength), wavelength, self.method)
 
 
-def run(setup: Setup, out: Path) -> Iterator[tuple[str, str]]:
-    """Trace a setup and write what it asks for; all files appear at the end, or none.
+def run(experiment: Experiment, out: Path) -> Iterator[tuple[str, str]]:
+    """Trace a setup and write its outputs, all of them or none.
 
     Parameters
     ----------
-    setup : Setup
+    experiment : Experiment
     out : Path
         Folder to write to.
 
@@ -124,13 +124,13 @@ def run(setup: Setup, out: Path) -> Iterator[tuple[str, str]]:
     ValueError
         If there are no wavelengths or no beam, or no CCD for what is asked for.
     """
-    _check(setup)
-    current = Run(setup)
+    _check(experiment)
+    current = Run(experiment)
     with staged(out) as folder:
         yield "scene", _described(current)
-        for wavelength in setup.wavelengths:
+        for wavelength in experiment.wavelengths:
             yield from _traced(current, wavelength)
-        for name in setup.outputs:
+        for name in experiment.outputs:
             missing = WRITERS[name](current, folder)
             if missing is not None:
                 yield f"no {name}", missing
@@ -138,25 +138,25 @@ def run(setup: Setup, out: Path) -> Iterator[tuple[str, str]]:
     yield "written", f"{out}: {', '.join(files)}"
 
 
-def _check(setup: Setup) -> None:
-    if not setup.wavelengths:
+def _check(experiment: Experiment) -> None:
+    if not experiment.wavelengths:
         raise ValueError("wavelengths: expected at least one to run a scene, got none")
-    if setup.bench is None and not setup.beam:
+    if experiment.bench is None and not experiment.beam:
         raise ValueError("beam: expected at least one to run a scene, got none")
-    for name in setup.outputs:
-        if setup.bench is None and setup.ccd is None and name not in BLIND:
+    for name in experiment.outputs:
+        if experiment.bench is None and experiment.ccd is None and name not in BLIND:
             raise ValueError(f"ccd: expected one for {name}, got none")
 
 
 def _described(current: Run) -> str:
-    setup = current.setup
-    surfaces = setup.scene.surfaces
+    experiment = current.experiment
+    surfaces = experiment.scene.surfaces
     parts = [f"{len(surfaces)} surfaces, {sum(len(s.mesh.faces) for s in surfaces):,} triangles"]
-    if setup.bench is not None:
-        parts.insert(0, setup.bench.name)
+    if experiment.bench is not None:
+        parts.insert(0, experiment.bench.name)
     rays = ", ".join(f"{beam.shape[1]} x {beam.shape[0]}" for beam in current.beams)
     parts.append(f"beams: {len(current.beams)} of {rays} rays")
-    if current.bench is not None or setup.ccd is not None:
+    if current.bench is not None or experiment.ccd is not None:
         rows, columns = current.ccd.shape
         parts.append(f"{columns} x {rows} pixels of {1e6 * current.ccd.pitch:.4g} um")
     return "; ".join(parts)
@@ -179,7 +179,7 @@ def _traced(current: Run, wavelength: float) -> Iterator[tuple[str, str]]:
         return
     for number, paths in enumerate(every):
         method = chosen(paths, current.method)
-        costs, notes = checks.judged(paths, wavelength, method)
+        costs, notes = checks.judge(paths, wavelength, method)
         yield "budget", f"{f'beam {number}' if len(every) > 1 else 'of the image'}: {costs.line}"
         yield from (("note", note) for note in notes)
 
@@ -190,8 +190,8 @@ def _named(wavelength: float) -> str:
 
 def _marked(name: str, current: Run) -> Iterator[tuple[float, str]]:
     """Wavelengths, and the name of a file at each: after the wavelength, too, if there are several."""
-    several = len(current.setup.wavelengths) > 1
-    for wavelength in current.setup.wavelengths:
+    several = len(current.experiment.wavelengths) > 1
+    for wavelength in current.experiment.wavelengths:
         yield wavelength, f"{name}-{_named(wavelength).replace(' ', '')}" if several else name
 
 
@@ -236,17 +236,17 @@ def _height_png(current: Run, folder: Path) -> None:
 
 def _height(current: Run, wavelength: float) -> FloatArray:
     assert current.bench is not None
-    return current.bench.height(wavelength, current.setup.steps)
+    return current.bench.height(wavelength, current.experiment.steps)
 
 
 def _frames(current: Run, wavelength: float) -> FloatArray:
     assert current.bench is not None
-    return current.bench.phase_steps(wavelength, current.setup.steps)
+    return current.bench.phase_steps(wavelength, current.experiment.steps)
 
 
 def _stack(current: Run, find: Callable[[float], Array]) -> Array:
     """What is found at each wavelength, (wavelengths, ...)."""
-    return np.stack([find(wavelength) for wavelength in current.setup.wavelengths])
+    return np.stack([find(wavelength) for wavelength in current.experiment.wavelengths])
 
 
 def _tif(name: str, find: Callable[[Run, float], FloatArray]) -> Callable[[Run, Path], None]:
@@ -255,7 +255,7 @@ def _tif(name: str, find: Callable[[Run, float], FloatArray]) -> Callable[[Run, 
     def write(current: Run, folder: Path) -> None:
         images = _stack(current, lambda wavelength: find(current, wavelength))
         images = images[0] if len(images) == 1 else images
-        wavelengths = list(current.setup.wavelengths)
+        wavelengths = list(current.experiment.wavelengths)
         tiff.save(images, current.ccd.pitch, folder / name, wavelengths_m=wavelengths)
 
     return write
@@ -266,7 +266,7 @@ def _images(current: Run, folder: Path, name: str, images: dict[str, Array]) -> 
     labelled = {
         what: (("wavelength", "component")[: values.ndim - 2], values) for what, values in images.items()
     }
-    axes = {"wavelength": (np.array(current.setup.wavelengths), "m")}
+    axes = {"wavelength": (np.array(current.experiment.wavelengths), "m")}
     table = records.dataset(labelled, current.ccd.pitch, axes, method=current.method)
     tables.write_netcdf(table, folder / name)
 
@@ -288,7 +288,7 @@ def _field_nc(current: Run, folder: Path) -> None:
 def _paths_nc(current: Run, folder: Path) -> None:
     """Where every path ended; rows of one beam after those of another, wavelength by wavelength."""
     found: dict[int, tuple[float, int, Paths]] = {}
-    for wavelength in current.setup.wavelengths:
+    for wavelength in current.experiment.wavelengths:
         for number, paths in enumerate(current.paths(wavelength)):
             found.setdefault(id(paths), (wavelength, number, paths))
 
@@ -313,17 +313,17 @@ def _paths_nc(current: Run, folder: Path) -> None:
         "amplitude_real": (row, column(lambda p: p.amplitude.real), {}),
         "amplitude_imag": (row, column(lambda p: p.amplitude.imag), {}),
     }
-    tables.write_netcdf(tables.dataset(variables, {}, {}), folder / "paths.nc")
+    tables.write_netcdf(tables.labelled_dataset(variables, {}, {}), folder / "paths.nc")
 
 
-def seen(
-    setup: Setup, wavelength: float | None, rays: int
+def scene_to_draw(
+    experiment: Experiment, wavelength: float | None, rays: int
 ) -> tuple[Scene, list[Paths], FloatArray | None, Mark | None]:
-    """A setup to be looked at.
+    """Scene, paths and drawing options of a setup, for a view.
 
     Parameters
     ----------
-    setup : Setup
+    experiment : Experiment
     wavelength : float, metres, optional
         None: the first that it names, if it names any.
     rays : int
@@ -339,22 +339,22 @@ def seen(
     reference : Mark or None
         What a phase step turns, of a bench.
     """
-    current = Run(setup)
-    bench, ccd = current.bench, setup.ccd if current.bench is None else current.ccd
+    current = Run(experiment)
+    bench, ccd = current.bench, experiment.ccd if current.bench is None else current.ccd
     beams = [replace(beam, shape=few(beam.shape, rays)) for beam in current.beams]
     paths = [current.traced(beam, ccd, wavelength, record=True) for beam in beams]
     image = None if ccd is None or wavelength is None or not beams else current.image(wavelength)
-    reference = None if bench is None else bench.mark or Mark(bench.reference)
-    return setup.scene, paths, image, reference
+    reference = None if bench is None else bench.arms.reference
+    return experiment.scene, paths, image, reference
 
 
 def _scene_png(current: Run, folder: Path) -> str | None:
     """The scene with some rays of the first beam; or why there is no picture."""
     from fringetrace import views
 
-    first, scene, setup = current.beams[0], current.setup.scene, current.setup
-    ccd = setup.ccd if current.bench is None else current.ccd
-    wavelength = None if needs(scene) is None else setup.wavelengths[0]
+    first, scene, experiment = current.beams[0], current.experiment.scene, current.experiment
+    ccd = experiment.ccd if current.bench is None else current.ccd
+    wavelength = None if needs(scene) is None else experiment.wavelengths[0]
     beam = replace(first, shape=few(first.shape))
     paths = current.traced(beam, ccd, wavelength, record=True)
     try:

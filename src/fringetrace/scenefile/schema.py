@@ -1,4 +1,4 @@
-"""What a scene file may name: the kinds of things, and their parameters with type and unit.
+"""Schema of scene files: kinds of objects, and their parameters with type and unit.
 
 All of it is read off dataclasses and signatures, units off the docstrings: a new kind needs no word here.
 """
@@ -19,20 +19,20 @@ import numpy.typing as npt
 
 from fringetrace.core import FloatArray
 from fringetrace.geometry import Form, Mesh
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.optics import Element, Film, Material, PhasePlate, Retarder
 from fringetrace.scenefile.toml import choice
 
 # Where the public dataclasses, and the functions that return one, can be named: modules of doors, or doors.
 SOURCES = (
     "optics.interfaces", "optics.elements", "optics.polarisers", "optics.birefringent", "optics.gratings",
-    "optics.phase_plates", "optics.films", "optics.materials", "geometry.forms", "geometry.shapes", "scene",
-    "instruments",
+    "optics.phase_plates", "optics.films", "optics.materials.material", "optics.materials.dispersion",
+    "geometry.forms", "geometry.shapes", "scene", "instruments",
 )  # fmt: skip
 # What annotations name that their own files import for type checkers only, and what functions return.
 NAMES: dict[str, Any] = {
-    "Bench": Bench, "Element": Element, "Film": Film, "Form": Form, "Material": Material, "Mesh": Mesh,
-    "PhasePlate": PhasePlate, "Retarder": Retarder,
+    "Interferometer": Interferometer, "Element": Element, "Film": Film, "Form": Form, "Material": Material,
+    "Mesh": Mesh, "PhasePlate": PhasePlate, "Retarder": Retarder,
 }  # fmt: skip
 _SECTION = re.compile(r"^Parameters\n-+\n(.*?)(?=^\w[^\n]*\n-+\n|\Z)", re.DOTALL | re.MULTILINE)
 _SLOT = re.compile(r"^(\*?\w+(?:, \*?\w+)*) : (.*)$", re.MULTILINE)
@@ -70,7 +70,7 @@ class Parameter:
 
     @property
     def required(self) -> bool:
-        """Whether it has to be given."""
+        """Whether the parameter has no default."""
         return self.default is inspect.Parameter.empty and not self.several
 
 
@@ -97,7 +97,7 @@ def _unit(slot: str) -> Unit:
 
 @functools.cache
 def parameters(kind: Kind) -> dict[str, Parameter]:
-    """The parameters of a dataclass or a function.
+    """Parameters of a dataclass or a function.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def parameters(kind: Kind) -> dict[str, Parameter]:
 
 
 def members(hint: Any) -> tuple[Any, ...]:
-    """The alternatives of a type, without None; what numpy takes for an array is one of them.
+    """Alternatives of a union type, without None; numpy's array-likes count as one.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ def _protocol(member: Any) -> bool:
 
 
 def concrete(some: Sequence[Any]) -> list[type]:
-    """Those alternatives that are dataclasses themselves.
+    """Alternatives of a union type that are dataclasses.
 
     Parameters
     ----------
@@ -181,6 +181,8 @@ def _vocabulary() -> dict[str, list[tuple[Kind, type]]]:
     found: dict[str, list[tuple[Kind, type]]] = {}
     for name, value in (pair for source in SOURCES for pair in _offered(source)):
         made = None
+        if value is Interferometer:  # benches are made by the functions that return one
+            continue
         if inspect.isclass(value) and dataclasses.is_dataclass(value):
             made = value
         elif inspect.isfunction(value):
@@ -198,11 +200,11 @@ def _kinds(some: tuple[Any, ...]) -> dict[str, Kind]:
         for kind, made in candidates
         if any(_fits(made, member) for member in some)
     }
-    return {**known, **{part.__name__: part for part in concrete(some) if part not in (Bench, Mesh)}}
+    return {**known, **{part.__name__: part for part in concrete(some) if part not in (Interferometer, Mesh)}}
 
 
 def kinds(some: Sequence[Any]) -> dict[str, Kind]:
-    """What can be named where a value of some types is expected.
+    """Kinds of objects that may stand where a value of some types is expected.
 
     Parameters
     ----------
@@ -217,7 +219,7 @@ def kinds(some: Sequence[Any]) -> dict[str, Kind]:
 
 
 def call(kind: Kind, arguments: Mapping[str, Any]) -> Any:
-    """A dataclass or a function called with arguments by name, `*several` among them.
+    """Call a dataclass or a function with arguments by name, `*args` among them.
 
     Parameters
     ----------
@@ -234,7 +236,7 @@ def call(kind: Kind, arguments: Mapping[str, Any]) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """A bench by its name and arguments.
+    """Interferometer given by its name and arguments.
 
     Parameters
     ----------
@@ -253,7 +255,7 @@ class Recipe:
     arguments: Mapping[str, Any]
 
     def __post_init__(self) -> None:
-        known = kinds([Bench])
+        known = kinds([Interferometer])
         if self.name not in known:
             raise ValueError(f"bench type: {choice(self.name, known)}")
         for name in self.arguments:
@@ -261,7 +263,7 @@ class Recipe:
                 raise ValueError(f"{self.name} {name}: {choice(name, parameters(known[self.name]))}")
 
     @functools.cached_property
-    def bench(self) -> Bench:
-        """The bench."""
-        bench: Bench = call(kinds([Bench])[self.name], self.arguments)
+    def bench(self) -> Interferometer:
+        """Build the interferometer."""
+        bench: Interferometer = call(kinds([Interferometer])[self.name], self.arguments)
         return bench

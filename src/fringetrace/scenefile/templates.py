@@ -1,4 +1,4 @@
-"""Scene files to begin with, one for each bench, made from its signature; and one of a free scene."""
+"""Templates of scene files: one per interferometer, made from its signature, and one of a free scene."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fringetrace.geometry import Mesh
-from fringetrace.instruments import Bench
+from fringetrace.instruments import Interferometer
 from fringetrace.scenefile.encode import Shelf, encode
 from fringetrace.scenefile.schema import Kind, Parameter, kinds, members, parameters
 from fringetrace.scenefile.toml import choice, dump
@@ -69,7 +69,7 @@ shape = [128, 128]
 
 
 def template(name: str) -> str:
-    """A scene file that runs.
+    """Text of a scene file that runs.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def template(name: str) -> str:
     ValueError
         If there is no such bench; says the nearest one.
     """
-    benches = kinds([Bench])
+    benches = kinds([Interferometer])
     if name == "free":
         return FREE
     if name not in benches:

@@ -1,4 +1,4 @@
-"""TOML: values that know the line they stand in, and text from values."""
+"""TOML with line numbers: parsing, error messages with file and line, and writing."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _PLACE = re.compile(r" \(at (?:line (\d+), column \d+|end of document)\)$")
 
 @dataclass(frozen=True, eq=False)
 class Document:
-    """A TOML file.
+    """Parsed TOML file.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Document:
     lines: Mapping[Path, int]
 
     def error(self, path: Path, text: str) -> ValueError:
-        """An error with the file and the line of a value, or of what it is in.
+        """Error with the file and the line of a value, or of its parent.
 
         Parameters
         ----------
@@ -58,7 +58,7 @@ class Document:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """Where in which file a value stands, and what may be read from there.
+    """Position of a value in a file, and the files that may be read from there.
 
     Parameters
     ----------
@@ -76,16 +76,16 @@ class Place:
     keys: Path = ()
 
     def at(self, key: str | int) -> Place:
-        """The place of a part of the value."""
+        """Position of a part of the value."""
         return Place(self.document, self.folder, self.outside, (*self.keys, key))
 
     def error(self, text: str) -> ValueError:
-        """An error that names file, line and key."""
+        """Error that names file, line and key."""
         words = [key for key in self.keys if isinstance(key, str)]
         return self.document.error(self.keys, f"{'.'.join(words)}: {text}" if words else text)
 
     def file(self, text: Any) -> pathlib.Path:
-        """A file that a scene file names."""
+        """Path of a file that a scene file names."""
         if not isinstance(text, str) or not text:
             raise self.error(f"expected the name of a file, got {text!r}")
         path = (self.folder / text).resolve()
@@ -98,7 +98,7 @@ class Place:
 
 
 def choice(given: Any, known: Iterable[str]) -> str:
-    """What to say of a word that is none of those known.
+    """Error text for an unknown word, with the nearest known one.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def choice(given: Any, known: Iterable[str]) -> str:
 
 
 def parse(text: str, name: str) -> Document:
-    """The values of a TOML text, and their lines.
+    """Parse a TOML text into values and their lines.
 
     Parameters
     ----------

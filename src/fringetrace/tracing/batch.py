@@ -69,7 +69,7 @@ class Light(NamedTuple):
     Attributes
     ----------
     medium : (n,) int32
-        Number of the medium that the ray is in, see `optics_table.materials`.
+        Number of the medium that the ray is in, see `optics_table.scene_media`.
     real_index : (n,) float64
         Its real index for the ray: |Re k| / k0.
     fade : (n, 3) float64, or (0, 3) where no medium absorbs
@@ -134,6 +134,11 @@ def grown(table: Table, rows: int) -> Table:
         wider[: len(column)] = column
         columns.append(wider)
     return _made(table, columns)
+
+
+def columns(table: Table | None) -> tuple[Array, ...] | None:
+    """The columns of a table, if there is one, as the kernels take them."""
+    return None if table is None else tuple(table)
 
 
 def copy_rows(table: Table, rows: Array, to: Array) -> None:

@@ -12,8 +12,9 @@ from fringetrace.tracing.fates import ABSORBED, ALIVE, FAINT
 
 if TYPE_CHECKING:
     from fringetrace.optics import Branch, Element
-    from fringetrace.tracing.loop import Plan, Workspace
+    from fringetrace.tracing.plan import Plan
     from fringetrace.tracing.record import Record
+    from fringetrace.tracing.workspace import Workspace
 
 
 def _power(field: ComplexArray) -> FloatArray:
@@ -35,7 +36,7 @@ def act(plan: Plan, space: Workspace, number: int, element: Element, record: Rec
     record : Record, optional
         Of this chunk.
     """
-    from fringetrace.optics import Meeting
+    from fringetrace.optics import IncidentRays
 
     batch, light = space.batch, space.light
     assert light is not None
@@ -44,13 +45,13 @@ def act(plan: Plan, space: Workspace, number: int, element: Element, record: Rec
     if len(rows) == 0:
         return
     table = batch.state[rows]
-    meeting = Meeting(
+    rays = IncidentRays(
         point=table[:, :3], direction=table[:, 3:6], normal=table[:, 6:9], index=light.real_index[rows],
         field=light.field[rows] if plan.optics.polarised else batch.amplitude[rows],
         wavelength=plan.optics.wavelength,
     )  # fmt: skip
-    branches = element.act(meeting)
-    batch.lost[rows] += _power(meeting.field) - sum(_power(branch.field) for branch in branches)
+    branches = element.act(rays)
+    batch.lost[rows] += _power(rays.field) - sum(_power(branch.field) for branch in branches)
     if element.chromatic:
         light.bend[rows] = 2.0
     digit = np.uint64(2 * len(plan.scene.surfaces) + 1 + _further(plan, number))

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Fate(IntEnum):
-    """Why a path ended."""
+    """Fate of a path: why it ended."""
 
     DETECTED = 0
     LEFT = 1

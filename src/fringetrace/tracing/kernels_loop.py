@@ -1,8 +1,11 @@
 """Compiled passes of the tracing loop: rays bounce, split, end, and close up.
 
-`interact` is the general pass. Where light meets nothing but constant amplitudes in a vacuum, `light` is
-None, and numba leaves out all that is about media. `rebound` is the same pass for ideal mirrors in one
-body, together with its search for hits: half as long again without it (benchmarks/loop.py).
+`interact` is the general pass. Where light meets nothing but constant amplitudes in a vacuum,
+`light_columns` is None, and numba leaves out all that is about media. `rebound` is the same pass for ideal
+mirrors in one body, together with its search for hits: a third more time without it.
+
+Kernels take tables as plain tuples and name their columns inside: numba would pickle the classes of
+named tuples into its cache, and fail to load it once they have another place.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import numpy as np
 
 from fringetrace.core import jit
 from fringetrace.optics import bare, coated
+from fringetrace.tracing.batch import Batch, Ends, Light
 from fringetrace.tracing.fates import ABSORBED, ALIVE, FAINT
 from fringetrace.tracing.intersect.kernels import (  # fmt: skip
     EDGE,
@@ -47,22 +51,25 @@ from fringetrace.tracing.kernels_rays import (
     write_ray,
     write_vector,
 )
-from fringetrace.tracing.optics_table import BOUNDARY, CONSTANT
+from fringetrace.tracing.optics_table import BOUNDARY, CONSTANT, SurfaceTable
+from fringetrace.tracing.plan import Limits
 
 
 @jit
-def compact(batch, light, start, stop, to, why, ends, end_light, ended):
+def compact(batch_columns, light_columns, start, stop, to, why, end_columns, end_light_columns, ended):
     """Move the rows of a batch from `start` to `stop` up to row `to`, but for those that end here.
 
     `why` is what becomes of each. Returns how many rows of the batch and of the ends are filled.
     """
+    batch, ends = Batch(*batch_columns), Ends(*end_columns)
     state, last, came = batch.state, batch.last, batch.came
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
     origin, direction, length, fate = ends.origin, ends.direction, ends.length, ends.fate
     end_key, end_ray, end_bounces, end_serial = ends.key, ends.ray, ends.bounces, ends.serial
     end_lost, end_amplitude, end_reflections = ends.lost, ends.amplitude, ends.reflections
-    if light is not None:
+    if light_columns is not None:
+        light, end_light = Light(*light_columns), Light(*end_light_columns)
         fading, polarised = len(light.fade) > 0, len(light.field) > 0
         medium, indices, lengths = light.medium, light.real_index, light.lengths
         fades, fields, dropped, bend = light.fade, light.field, light.dropped, light.bend
@@ -77,7 +84,7 @@ def compact(batch, light, start, stop, to, why, ends, end_light, ended):
             write_end(origin, direction, length, fate, ended, x, y, z, dx, dy, dz, way, why[row])
             write_path(end_key, end_ray, end_bounces, end_serial, ended, here, number, steps, name)
             write_power(end_lost, end_amplitude, end_reflections, ended, gone, value, mirrored)
-            if light is not None:
+            if light_columns is not None:
                 write_matter(
                     end_medium, end_indices, end_dropped, end_bend, ended, medium[row], indices[row],
                     dropped[row], bend[row],
@@ -96,7 +103,7 @@ def compact(batch, light, start, stop, to, why, ends, end_light, ended):
             write_last(last, came, to, last[row], came[row, 0], came[row, 1], came[row, 2])
             write_path(key, ray, bounces, serial, to, here, number, steps, name)
             write_power(lost, amplitude, reflections, to, gone, value, mirrored)
-            if light is not None:
+            if light_columns is not None:
                 write_matter(
                     medium, indices, dropped, bend, to, medium[row], indices[row], dropped[row], bend[row]
                 )
@@ -112,8 +119,8 @@ def compact(batch, light, start, stop, to, why, ends, end_light, ended):
 
 @jit
 def interact(
-    count, batch, light, met, triangle, owner, surfaces, limits, ends, end_light, ended, first, serials, why,
-    parent, contradictions,
+    count, batch_columns, light_columns, met, triangle, owner, surface_columns, limit_columns, end_columns,
+    end_light_columns, ended, first, serials, why, parent, contradictions,
 ):  # fmt: skip
     """Send each ray to what it meets and on from there; write down those that end, close up the rest.
 
@@ -124,7 +131,10 @@ def interact(
     came in another medium than it has there. Where all surfaces are `ideal` amplitudes follow from bounces.
     Returns how many rays go on, how many have ended, and the next serial number.
     """
-    # not taken apart further: what branches over arrays would count references, 170 ns a ray
+    # not taken apart further: numba counts references to arrays that are handed to other functions in
+    # loops and branches, 100 ns a ray
+    batch, ends = Batch(*batch_columns), Ends(*end_columns)
+    surfaces, limits = SurfaceTable(*surface_columns), Limits(*limit_columns)
     state, last, came = batch.state, batch.last, batch.came
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
@@ -135,7 +145,8 @@ def interact(
     ideal, faint = surfaces.ideal, limits.faint
     base = np.uint64(limits.key_base)
     polarised, fading = False, False
-    if light is not None:
+    if light_columns is not None:
+        light, end_light = Light(*light_columns), Light(*end_light_columns)
         fading, polarised = len(light.fade) > 0, len(light.field) > 0
         medium, indices, lengths = light.medium, light.real_index, light.lengths
         fades, fields, dropped, bend = light.fade, light.field, light.dropped, light.bend
@@ -153,14 +164,14 @@ def interact(
         if not ideal:
             value, gone, mirrored = amplitude[row], lost[row], reflections[row]
             if polarised:
-                if light is not None:
+                if light_columns is not None:
                     field = 0j, fields[row, 0], fields[row, 1], fields[row, 2]
             else:
                 field = value, 0j, 0j, 0j
         k = triangle[row]
         fate, reach = fated(limits, steps, k >= 0, path, x, y, z, dx, dy, dz)
         step = path if fate == ALIVE else reach
-        if light is None:
+        if light_columns is None:
             way += step
         else:
             inside, index, aside, steepest = medium[row], indices[row], dropped[row], bend[row]
@@ -184,7 +195,7 @@ def interact(
             h = reflected(dx, dy, dz, nx, ny, nz, facing, steps)
             t = dx, dy, dz
             back, through, returns, passes = field, field, 1.0, 0.0
-            if light is None:
+            if light_columns is None:
                 if not ideal:
                     r, s = reflection[surface], transmission[surface]
                     back, through = (field[0] * r, 0j, 0j, 0j), (field[0] * s, 0j, 0j, 0j)
@@ -219,7 +230,7 @@ def interact(
             if returns > 0.0:
                 if passes > 0.0:
                     new = count + born
-                    if light is not None:
+                    if light_columns is not None:
                         write_matter(medium, indices, dropped, bend, new, beyond, beside, 0.0, steepest)
                         for m in range(lengths.shape[1]):
                             lengths[new, m] = lengths[row, m]
@@ -237,13 +248,13 @@ def interact(
                     why[new] = FAINT if passes < faint else ALIVE
                     parent[born], born = row, born + 1
                 (dx, dy, dz), field = h, back
-                if light is not None and fading:
+                if light_columns is not None and fading:
                     f = f[0] - 2.0 * fade * nx, f[1] - 2.0 * fade * ny, f[2] - 2.0 * fade * nz
                 fate = FAINT if returns < faint else ALIVE
             elif passes > 0.0:
                 here += np.uint64(1)
                 (dx, dy, dz), field = t, through
-                if light is not None:
+                if light_columns is not None:
                     inside, index, f = beyond, beside, u
                 fate = FAINT if passes < faint else ALIVE
             else:
@@ -255,7 +266,7 @@ def interact(
             write_path(key, ray, bounces, serial, kept, here, number, steps, name)
             if not ideal:
                 write_power(lost, amplitude, reflections, kept, gone, value, mirrored)
-            if light is not None:
+            if light_columns is not None:
                 write_matter(medium, indices, dropped, bend, kept, inside, index, aside, steepest)
                 if kept < row:
                     for m in range(lengths.shape[1]):
@@ -272,7 +283,7 @@ def interact(
         write_path(end_key, end_ray, end_bounces, end_serial, end, here, number, steps, name)
         if not ideal:
             write_power(end_lost, end_amplitude, end_reflections, end, gone, value, mirrored)
-        if light is not None:
+        if light_columns is not None:
             write_matter(end_medium, end_indices, end_dropped, end_bend, end, inside, index, aside, steepest)
             for m in range(lengths.shape[1]):
                 end_lengths[end, m] = lengths[row, m]
@@ -281,18 +292,23 @@ def interact(
             if polarised:
                 write_vector(end_fields, end, field[1], field[2], field[3])
         ended += 1
-    kept, ended = compact(batch, light, count, count + born, kept, why, ends, end_light, ended)
+    kept, ended = compact(
+        batch_columns, light_columns, count, count + born, kept, why, end_columns, end_light_columns, ended
+    )
     return kept, ended, serials + born
 
 
 @jit
-def rebound(count, steps, prim, batch, body, digit, limits, ends, first, origin32, direction32):
+def rebound(
+    count, steps, prim, batch_columns, body, digit, limit_columns, end_columns, first, origin32, direction32
+):  # fmt: skip
     """`measure`, `interact` and `aim` in one, for a single body of ideal mirrors that all rays just left.
 
     Each has made `steps` bounces. `digit` is what a triangle adds to a key.
 
     Returns how many rays go on, how many have ended, and how many hits were doubtful.
     """
+    batch, ends, limits = Batch(*batch_columns), Ends(*end_columns), Limits(*limit_columns)
     key, ray, state, last, came = batch.key, batch.ray, batch.state, batch.last, batch.came
     end_key, end_ray, end_bounces = ends.key, ends.ray, ends.bounces
     origin, direction, length, end_fate = ends.origin, ends.direction, ends.length, ends.fate

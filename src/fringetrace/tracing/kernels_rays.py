@@ -6,6 +6,7 @@ import numpy as np
 
 from fringetrace.core import jit, part
 from fringetrace.scene import lands
+from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.fates import ALIVE, DETECTED, LEFT, TRUNCATED
 from fringetrace.tracing.intersect.kernels import (  # fmt: skip
     DX,
@@ -126,8 +127,9 @@ def fated(limits, steps, meets, path, x, y, z, dx, dy, dz):
 
 
 @jit
-def begin(start, along, length, first, batch):
+def begin(start, along, length, first, columns):
     """Fill a batch with rays that have met nothing yet; the amplitude is that of the path alone."""
+    batch = Batch(*columns)
     state, last, came = batch.state, batch.last, batch.came
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections

@@ -1,4 +1,4 @@
-"""The media of a scene at a wavelength, as the kernels read them; paths at another wavelength."""
+"""Optical constants of a scene's media and surfaces at a wavelength, as tables for the kernels."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ class Optics:
         return not self.vacuum or bool((abs(table.reflection) * abs(table.transmission)).any())
 
 
-def materials(scene: Scene) -> tuple[Material, ...]:
-    """The media of a scene by their numbers, first that around it.
+def scene_media(scene: Scene) -> tuple[Material, ...]:
+    """Media of a scene by number, the surrounding one first.
 
     Parameters
     ----------
@@ -117,7 +117,7 @@ def _film(surface: Surface) -> tuple[tuple[Material, float], ...]:
 
 
 def plain(scene: Scene, polarised: bool) -> bool:
-    """Whether light meets nothing but constant amplitudes in a vacuum.
+    """Whether all surfaces have constant amplitudes, and the medium is vacuum.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def plain(scene: Scene, polarised: bool) -> bool:
 
 
 def needs(scene: Scene) -> str | None:
-    """What in a scene depends on the wavelength, in words; None if nothing does.
+    """Reason why a scene depends on the wavelength, in words; None if it does not.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def needs(scene: Scene) -> str | None:
     -------
     str or None
     """
-    for medium in materials(scene):
+    for medium in scene_media(scene):
         if medium.dispersive:
             return f"{medium.name} is dispersive"
         if complex(medium.index(1.0)).imag != 0.0:
@@ -197,7 +197,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
 
 
 def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:
-    known = materials(scene)
+    known = scene_media(scene)
     numbers = {medium: number for number, medium in enumerate(known)}
     sides = [[s.front or scene.around, s.back or scene.around] for s in scene.surfaces]
     beside = np.array([[numbers[medium] for medium in side] for side in sides], dtype=np.int32)
@@ -209,7 +209,7 @@ def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:
         front=beside[:, 0].copy(),
         back=beside[:, 1].copy(),
         media=np.array([_index(medium, wavelength) for medium in known]),
-        follow=np.array([_followed(surface) for surface in scene.surfaces], dtype=np.int8),
+        follow=np.array([followed_branches(surface) for surface in scene.surfaces], dtype=np.int8),
         film=_layers(scene, wavelength),
         k0=0.0,
         ideal=vacuum and bool((reflection == -1.0).all() and not transmission.any()),
@@ -225,7 +225,7 @@ def _index(medium: Material, wavelength: float) -> complex:
 
 
 def thin(scene: Scene) -> dict[int, Element]:
-    """The thin elements of a scene, by the number of their surface.
+    """Thin elements of a scene, by surface number.
 
     Parameters
     ----------
@@ -240,7 +240,7 @@ def thin(scene: Scene) -> dict[int, Element]:
 
 
 def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
-    """Amplitudes of both branches of each surface where they are constant.
+    """Reflection and transmission amplitudes of surfaces where they are constant.
 
     Parameters
     ----------
@@ -261,7 +261,8 @@ def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
     return table[0], table[1]
 
 
-def _followed(surface: Surface) -> int:
+def followed_branches(surface: Surface) -> int:
+    """Bits of the branches that are traced at a surface: reflected, transmitted, or opaque."""
     if isinstance(surface.interface, Metal):
         return REFLECTED | OPAQUE
     if isinstance(surface.interface, Dielectric):

@@ -1,8 +1,9 @@
-"""What came out of a trace: where each path ended and why, its optical path, and the power ledger."""
+"""Traced paths: ends and fates, optical path lengths, amplitudes, and the power ledger."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +19,7 @@ from fringetrace.tracing.rays import Rays
 
 @dataclass(frozen=True)
 class Ledger:
-    """Where the power went, in units of |amplitude|^2 * m^2 (or of rays, where they have no area).
+    """Power ledger: incident power by fate, in |amplitude|^2 * m^2 (or rays, where they have no area).
 
     `truncated` is what was cut off by the number of bounces or by the least amplitude, and branches
     that were not to be followed.
@@ -32,7 +33,7 @@ class Ledger:
 
     @property
     def error(self) -> float:
-        """Power unaccounted for, relative to the incident power."""
+        """Unaccounted power, relative to the incident power."""
         total = self.detected + self.left + self.absorbed + self.truncated
         return abs(total - self.incident) / self.incident if self.incident else abs(total)
 
@@ -44,7 +45,7 @@ class Ledger:
 
 @dataclass(frozen=True, eq=False)
 class Paths:
-    """One row for each end of a path, sorted by ray; a ray that splits has several.
+    """Traced paths: one row per end, sorted by ray; a ray that splits has several.
 
     Attributes
     ----------
@@ -148,12 +149,14 @@ class Paths:
     bend: FloatArray | None = None
     contradictions: npt.NDArray[np.int64] | None = None
     min_amplitude: float = 1e-6
+    # what is worked out from the paths once, such as their wavefronts
+    derived: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
 
     def __len__(self) -> int:
         return len(self.ray)
 
     def where(self, mask: Array) -> Paths:
-        """Some of the paths.
+        """Subset of the paths.
 
         Parameters
         ----------
@@ -168,17 +171,17 @@ class Paths:
         return replace(self, **chosen)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)} | {"derived": {}}
 
     @cached_property
     def detected(self) -> Paths:
-        """The paths that reached the CCD."""
+        """Paths that reached the CCD."""
         seen = self.fate == Fate.DETECTED
         return self if seen.all() else self.where(seen)
 
     @cached_property
     def pixel(self) -> FloatArray:
-        """(m, 2) float64: CCD coordinates (row, column) in pixels; NaN where not detected.
+        """CCD coordinates (row, column) in pixels, (m, 2) float64; NaN where not detected.
 
         Pixel [i, j] spans [i, i+1) x [j, j+1).
         """
@@ -191,18 +194,18 @@ class Paths:
 
     @property
     def starts(self) -> FloatArray | None:
-        """(m, b + 1, 3) float64, metres: where each segment starts, if recorded; padded with NaN."""
+        """Start points of segments, if recorded, (m, b + 1, 3) float64, metres; padded with NaN."""
         if self.departures is not None or self.points is None:
             return self.departures
         return self.points[:, :-1]
 
     @property
     def gradient(self) -> FloatArray:
-        """(m, 3) float64: gradient of the optical path where each path ended, index times direction."""
+        """Gradient of the optical path at each end, index times direction, (m, 3) float64."""
         return self.direction if self.index is None else self.index[:, None] * self.direction
 
     def sequence(self, row: int) -> list[tuple[int, bool]]:
-        """Surfaces that a path met and whether it went through them (decoded from its key).
+        """Surfaces that a path met, and whether it was transmitted (decoded from its key).
 
         Parameters
         ----------
@@ -224,7 +227,7 @@ class Paths:
         return [self.scene.digits[int(d) - 1] for d in digits]
 
     def visits(self, surface: int) -> npt.NDArray[np.int64]:
-        """How often each path met a surface.
+        """Number of times each path met a surface.
 
         Parameters
         ----------
@@ -247,7 +250,7 @@ class Paths:
         return np.asarray(np.isin(digits, mine).sum(axis=1)[which], dtype=np.int64)
 
     def kinds(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """The sequences among the paths (decoded from their keys), and which of them each path took.
+        """Surface sequences among the paths (decoded from their keys), and which each path took.
 
         Returns
         -------
@@ -291,7 +294,7 @@ class Paths:
         return digits
 
     def polyline(self, row: int) -> FloatArray:
-        """The points that a path went through.
+        """Points of a path.
 
         Parameters
         ----------
@@ -321,7 +324,7 @@ class Paths:
         return np.asarray(points[np.isfinite(points[:, 0])], dtype=np.float64)
 
     def ledger(self) -> Ledger:
-        """Power by fate; adds up to the incident power for the paths of a whole trace.
+        """Power ledger by fate; it adds up to the incident power for all paths of a trace.
 
         Returns
         -------
@@ -329,14 +332,15 @@ class Paths:
         """
         unit = 1.0 if self.area is None else self.area
         power = np.abs(self.amplitude) ** 2
-        by_fate = np.bincount(self.fate, weights=power, minlength=len(Fate)) * unit
+        # numpy adds by pairs: one after the other, as bincount does, a million paths lose four digits
+        ended = {fate: float(power[self.fate == fate].sum()) * unit for fate in Fate}
         dropped = 0.0 if self.dropped is None else float(self.dropped.sum()) * unit
         return Ledger(
             incident=self.incident * unit,
-            detected=float(by_fate[Fate.DETECTED]),
-            left=float(by_fate[Fate.LEFT]),
+            detected=ended[Fate.DETECTED],
+            left=ended[Fate.LEFT],
             absorbed=float(self.lost.sum() * unit),
-            truncated=float(by_fate[Fate.TRUNCATED] + by_fate[Fate.FAINT]) + dropped,
+            truncated=ended[Fate.TRUNCATED] + ended[Fate.FAINT] + dropped,
         )
 
 
@@ -368,12 +372,12 @@ def _summed(counts: Sequence[npt.NDArray[np.int64] | None]) -> npt.NDArray[np.in
     return np.sum(known, axis=0) if known else None
 
 
-def join(parts: Sequence[Paths]) -> Paths:
-    """Paths of consecutive rays of one source as one table.
+def join(parts: Iterable[Paths]) -> Paths:
+    """Concatenate paths of consecutive rays of one source.
 
     Parameters
     ----------
-    parts : sequence of Paths
+    parts : iterable of Paths
         In the order of their rays; at least one.
 
     Returns
@@ -383,8 +387,9 @@ def join(parts: Sequence[Paths]) -> Paths:
     Raises
     ------
     ValueError
-        If there are none.
+        If there are none, or some know what others do not (one trace was recorded, another was not).
     """
+    parts = list(parts)
     if not parts:
         raise ValueError("join: expected at least one Paths, got none")
     if len(parts) == 1:
@@ -392,8 +397,13 @@ def join(parts: Sequence[Paths]) -> Paths:
     columns: dict[str, Any] = {}
     for name in COLUMNS:
         arrays = [getattr(part, name) for part in parts]
-        if arrays[0] is None:
+        known = sum(array is not None for array in arrays)
+        if not known:
             continue
+        if known < len(arrays):
+            raise ValueError(
+                f"join: expected parts of one trace, got {name} in {known} of {len(arrays)} of them"
+            )
         if name in RECORDED:
             columns[name] = _padded(arrays, max(array.shape[1] for array in arrays), RECORDED[name])
         else:

@@ -1,4 +1,4 @@
-"""The batch of rays, a struct of arrays; launching one from a beam."""
+"""Rays: origins, directions, amplitudes; launch from a beam."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, component, unit
+from fringetrace.core import Array, ComplexArray, FloatArray, component, filled, unit
 from fringetrace.scene import Beam, as_names
 
 # A field may point along its ray by as much: rounding.
@@ -17,7 +17,7 @@ TRANSVERSE = 1e-9
 
 def _rows_of_three(value: npt.ArrayLike, what: str) -> FloatArray:
     try:
-        rows = np.ascontiguousarray(value, dtype=np.float64)
+        rows = np.ascontiguousarray(filled(value))
     except (TypeError, ValueError) as error:
         raise ValueError(f"{what}: expected numbers of shape (n, 3), got {error}") from error
     if rows.ndim != 2 or rows.shape[1] != 3:
@@ -33,7 +33,7 @@ def _rows_of_three(value: npt.ArrayLike, what: str) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class Rays:
-    """Rays to be traced.
+    """Rays to trace: origins, directions, optical path lengths, amplitudes.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class Rays:
         """A unit field across each ray."""
         what = "Rays polarisation"
         try:
-            fields = np.broadcast_to(np.asarray(value, dtype=np.complex128), (len(self), 3))
+            fields = np.broadcast_to(filled(value, np.complex128), (len(self), 3))
         except (TypeError, ValueError) as error:
             raise ValueError(f"{what}: expected numbers of shape ({len(self)}, 3), got {error}") from error
         size = np.linalg.norm(fields, axis=1, keepdims=True)
@@ -108,7 +108,7 @@ class Rays:
         if value is None:
             return np.full(len(self.origin), default, dtype=dtype)
         try:
-            column: Array = np.array(value, dtype=dtype)
+            column: Array = filled(value, dtype).copy()
         except (TypeError, ValueError) as error:
             raise ValueError(f"Rays {what}: expected numbers of shape (n,), got {error}") from error
         if column.shape != (len(self.origin),):
@@ -121,7 +121,7 @@ class Rays:
         return len(self.origin)
 
     def part(self, start: int, stop: int) -> Rays:
-        """The rays from `start` up to `stop`.
+        """Rays from `start` up to `stop`.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ def _field(beam: Beam, count: int) -> ComplexArray | None:
 
 
 def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
-    """Rays of a beam, from the centres of its grid cells, row by row.
+    """Launch rays of a beam from the centres of its grid cells, row by row.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
 
 
 def launch_at(beam: Beam, column: FloatArray, row: FloatArray) -> Rays:
-    """Rays of a beam from anywhere on its rectangle, all of amplitude 1.
+    """Launch rays of a beam from any points of its rectangle, with amplitude 1.
 
     Parameters
     ----------

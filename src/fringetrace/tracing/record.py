@@ -12,7 +12,7 @@ from fringetrace.tracing.batch import Ends
 from fringetrace.tracing.fates import Fate
 
 if TYPE_CHECKING:
-    from fringetrace.tracing.loop import Plan
+    from fringetrace.tracing.plan import Plan
 
 # What a record keeps of each hit, and what stands where there is none.
 Column = tuple[float, type, tuple[int, ...]]  # fill, dtype, shape of an entry

@@ -12,8 +12,9 @@ from fringetrace.core import ComplexArray, checked_wavelength
 from fringetrace.optics import Dielectric, Metal
 from fringetrace.scene import Surface
 from fringetrace.tracing.fates import Fate
-from fringetrace.tracing.optics_table import materials, needs
+from fringetrace.tracing.optics_table import REFLECTED, followed_branches, needs, scene_media
 from fringetrace.tracing.paths import Paths
+from fringetrace.tracing.rays import Rays
 
 if TYPE_CHECKING:
     from fringetrace.optics import Material
@@ -21,10 +22,13 @@ if TYPE_CHECKING:
 
 # Incidence (sin^2, rounded) up to which a boundary is met straight on, so that no wavelength is bent by it.
 STRAIGHT = 1e-14
+# A trace leaves out branches below its `min_amplitude`; at another wavelength these may have become so many
+# times that, as indices drift, before it has to be traced again.
+DRIFT = 10.0
 
 
 def at_wavelength(paths: Paths, wavelength: float) -> Paths:
-    """Paths as another wavelength takes them, without a new trace.
+    """Paths at another wavelength, without a new trace.
 
     Optical paths follow from the way in each medium, amplitudes of boundaries met straight on from the
     key: wherever nothing is bent by another angle.
@@ -41,7 +45,8 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
     Raises
     ------
     ValueError
-        If the other wavelength goes another way, or media contradict.
+        If the other wavelength goes another way, or media contradict; if the trace cut off branches that
+        are bright at the other wavelength.
     """
     wavelength = checked_wavelength(wavelength)
     if paths.wavelength is None or paths.wavelength == wavelength or paths.lengths is None:
@@ -60,10 +65,11 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
             f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since {why} and "
             f"light is bent, got {wavelength:.6g} m: trace once a wavelength"
         )
-    known = materials(paths.scene)
+    known = scene_media(paths.scene)
     old, new = (np.array([complex(m.index(at)) for m in known]) for at in (paths.wavelength, wavelength))
     phase = 2.0 * math.pi * (new.imag / wavelength - old.imag / paths.wavelength)
     factor = np.exp(-(paths.lengths @ phase)) * _ratio(paths, wavelength)
+    _check_cut(paths, factor, wavelength)
     return replace(
         paths,
         length=paths.length + paths.lengths @ (new.real - old.real),
@@ -114,3 +120,39 @@ def _straight_on(
         return complex(unit.rs), medium
     before, behind = (complex(m.index(wavelength)).real for m in (medium, beyond))
     return complex(unit.ts) * math.sqrt(behind / before), beyond
+
+
+def _check_cut(paths: Paths, factor: ComplexArray, wavelength: float) -> None:
+    """Raise ValueError if branches that were cut off as faint are bright at another wavelength.
+
+    `factor` (paths,) is what amplitudes change by. Those that were 0 to the last bit are not even there.
+    """
+    launched = paths.source.amplitude if isinstance(paths.source, Rays) else None
+    unit = 1.0 if launched is None else float(np.abs(launched).max(initial=0.0))
+    faint = paths.fate == Fate.FAINT
+    brightest = float(np.abs(paths.amplitude[faint] * factor[faint]).max(initial=0.0))
+    if brightest > DRIFT * paths.min_amplitude * unit:
+        what = f"branches that it cut off have up to {brightest / unit:.2g} of the launched amplitude there"
+    elif dark := _dark(paths, wavelength):
+        what = f"{dark} sends back no light at all at that wavelength, but at the other"
+    else:
+        return
+    raise ValueError(
+        f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since {what}, got "
+        f"{wavelength:.6g} m: trace once a wavelength"
+    )
+
+
+def _dark(paths: Paths, wavelength: float) -> str | None:
+    """Name of a boundary that was met, and reflects nothing at the traced wavelength, but does at another."""
+    assert paths.wavelength is not None
+    around = paths.scene.around
+    for number, surface in enumerate(paths.scene.surfaces):
+        if surface.boundary and followed_branches(surface) & REFLECTED and paths.visits(number).any():
+            front = surface.front or around
+            old, new = (
+                _straight_on(surface, front, around, at, False)[0] for at in (paths.wavelength, wavelength)
+            )
+            if old == 0.0 and new != 0.0:
+                return surface.name
+    return None

@@ -1,4 +1,4 @@
-"""A beam or rays through a scene: chunk by chunk, on a thread pool."""
+"""Ray tracer: a beam or rays through a scene, chunk by chunk on a thread pool."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fringetrace.core import ComplexArray
+from fringetrace.core import ComplexArray, checked_whole
 from fringetrace.scene import CCD, Beam, Scene, screen
 from fringetrace.tracing.batch import Ends, Light, blank, part
-from fringetrace.tracing.loop import Chunk, Limits, Plan, Workspace, advance
+from fringetrace.tracing.loop import Chunk, advance
 from fringetrace.tracing.paths import Paths, join
+from fringetrace.tracing.plan import Limits, Plan
 from fringetrace.tracing.rays import Rays
 from fringetrace.tracing.record import tables
+from fringetrace.tracing.workspace import Workspace
 
 if TYPE_CHECKING:
     from fringetrace.tracing.intersect.embree import Engine
@@ -31,12 +33,8 @@ Progress = Callable[[int, int], None]
 Result = TypeVar("Result")
 # Fewer rays: what a pass costs in Python shows (30 us each). More: memory, 10 MB a thread here.
 CHUNK = 32768
-
-
-def _whole(value: int, least: int, what: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise ValueError(f"{what}: expected a whole number of at least {least}, got {value!r}")
-    return int(value)
+# Bounces are counted in 32 bits; no trace lives to see so many.
+MOST = 2**31 - 2
 
 
 @dataclass(frozen=True)
@@ -52,13 +50,13 @@ class Options:
     progress: Progress | None
 
     def __post_init__(self) -> None:
-        _whole(self.max_bounces, 0, "max_bounces")
+        checked_whole(self.max_bounces, 0, "max_bounces")
         least = self.min_amplitude
         if not (isinstance(least, Real) and np.isfinite(least) and least >= 0.0):
             raise ValueError(f"min_amplitude: expected a number of at least 0, got {least!r}")
         for name in ("threads", "chunk"):
             if getattr(self, name) is not None:
-                _whole(getattr(self, name), 1, name)
+                checked_whole(getattr(self, name), 1, name)
 
     def rays_at_a_time(self, splits: bool) -> int:
         """Rays that a thread follows at a time: fewer where each may become several."""
@@ -91,7 +89,7 @@ def _plan(scene: Scene, source: Beam | Rays, ccd: CCD | None, options: Options) 
     limits = Limits(
         screen=(0.0,) * 15 if ccd is None else screen(ccd),
         has_screen=ccd is not None,
-        max_bounces=int(options.max_bounces),
+        max_bounces=min(int(options.max_bounces), MOST),
         faint=float(options.min_amplitude) ** 2,
         key_base=len(scene.digits) + 1,
     )
@@ -252,7 +250,7 @@ def stream(
     chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Paths]:
-    """Trace in chunks that need not fit into memory together; arguments as for `trace`.
+    """Trace in chunks, which need not fit into memory together; arguments as for `trace`.
 
     Parameters
     ----------
@@ -281,7 +279,7 @@ def trace(
     chunk: int | None = None,
     progress: Progress | None = None,
 ) -> Paths:
-    """Follow rays through a scene until they are detected, leave, or are cut off.
+    """Trace rays through a scene until they are detected, leave, or are cut off.
 
     Parameters
     ----------

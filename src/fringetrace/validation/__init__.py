@@ -1,4 +1,4 @@
-"""Known answers, run time against error, and measurements beside the truth."""
+"""Reference solutions, run time against error, and measured heights compared with the mesh."""
 
 import lazy_loader
 

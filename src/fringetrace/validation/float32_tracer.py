@@ -1,4 +1,4 @@
-"""A tracer in single precision throughout, written as they usually are: to compare with, not to use."""
+"""Reference ray tracer in single precision throughout, for comparison only."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ class _Rays:
         return replace(self, origin=origin, length=self.length + path)
 
 
-def trace(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int = 12) -> Paths:
-    """Follow rays as `fringetrace.tracing.tracer` does, with all lengths and directions in float32.
+def trace_float32(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int = 12) -> Paths:
+    """Trace like `fringetrace.trace`, with all lengths and directions in float32.
 
     Embree's distances as they come, points and optical paths added up in float32, in metres about the
     origin, restarts a fixed step off the surface. Forms are not looked at: facets are the surface.

@@ -1,4 +1,4 @@
-"""A measurement on a bench next to the truth, and its files: PNG, TIFF, NetCDF."""
+"""Measurement of a sample compared with its mesh, and its files: PNG, TIFF, NetCDF."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, FloatArray, tables
 from fringetrace.field import chosen
 from fringetrace.geometry import Mesh, interpolate_height, write_height_map
-from fringetrace.instruments import Bench, path_slope, records, stepped, tiff
+from fringetrace.instruments import Interferometer, path_slope, records, step_axis, tiff
 from fringetrace.scene import pixel_centres
 from fringetrace.tracing import Ledger
 
@@ -29,7 +29,7 @@ LIBRARIES = ("fringetrace", "numpy", "embreex", "numba", "scikit-image")
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """What a bench recorded of a sample, and how the height found differs from that of the mesh.
+    """Measurement of a sample: frames, height, and its residual against the mesh.
 
     Attributes
     ----------
@@ -64,23 +64,23 @@ class Measurement:
 
     @property
     def interferogram(self) -> FloatArray:
-        """(rows, columns) float64, |E|^2."""
+        """Interferogram |E|^2, (rows, columns) float64."""
         return np.asarray(self.frames[0])
 
     @property
     def full_scale(self) -> float:
-        """|E|^2 of 65535 counts in the 16-bit files: 1, or that of the brightest pixel if it is above 1."""
+        """Irradiance of 65535 counts in the 16-bit files: 1, or that of the brightest pixel if above 1."""
         return max(1.0, float(self.frames.max()))
 
     @property
     def fringes(self) -> float:
-        """Fringes across the image that the tilt alone makes, along its steeper axis."""
+        """Fringes across the image due to the tilt alone, along its steeper axis."""
         rows, columns = self.truth.shape
         slope_x, slope_y = path_slope(self.tilt)
         return float(max(abs(slope_x) * columns, abs(slope_y) * rows) * self.pitch / self.wavelength)
 
     def rms(self, where: Array | None = None) -> float:
-        """Root mean square of the residual.
+        """Root mean square of the residual, metres.
 
         Parameters
         ----------
@@ -99,7 +99,7 @@ class Measurement:
 def heights(
     mesh: Mesh, shape: tuple[int, int], pitch: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0)
 ) -> FloatArray:
-    """Heights of a mesh at the centres of pixels.
+    """Heights of a mesh at pixel centres.
 
     Parameters
     ----------
@@ -139,12 +139,14 @@ def _piston(differences: FloatArray, wavelength: float) -> float:
     return middle + float(about[np.abs(about) <= 0.25 * wavelength].mean())
 
 
-def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) -> Measurement:
-    """Record phase-stepped frames on a bench, find the height, and compare it with the truth.
+def measure_height(
+    bench: Interferometer, truth: FloatArray, wavelength: float, steps: int = 4
+) -> Measurement:
+    """Measure a sample: record phase-stepped frames, compute the height, compare it with the mesh.
 
     Parameters
     ----------
-    bench : Bench
+    bench : Interferometer
     truth : (rows, columns) float64, metres
         Heights at the pixels, see `heights`.
     wavelength : float, metres
@@ -163,7 +165,7 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
     return Measurement(
         wavelength=wavelength,
         pitch=bench.ccd.pitch,
-        tilt=bench.tilt,
+        tilt=bench.arms.tilt,
         frames=bench.phase_steps(wavelength, steps),
         wrapped=bench.wrapped(wavelength, steps),
         height=height,
@@ -174,8 +176,8 @@ def measure(bench: Bench, truth: FloatArray, wavelength: float, steps: int = 4) 
     )
 
 
-def dataset(measurement: Measurement) -> Dataset:
-    """Everything, labelled.
+def measurement_dataset(measurement: Measurement) -> Dataset:
+    """Labelled dataset of a measurement.
 
     Parameters
     ----------
@@ -204,22 +206,22 @@ def dataset(measurement: Measurement) -> Dataset:
         **{f"power_{name}": value for name, value in vars(m.ledger).items()},
         **{f"version_{name}": version(name) for name in LIBRARIES},
     }
-    return records.dataset(images, m.pitch, stepped(len(m.frames)), **attributes)
+    return records.dataset(images, m.pitch, step_axis(len(m.frames)), **attributes)
 
 
-def write_netcdf(measurement: Measurement, path: Path) -> None:
-    """`dataset` as a NetCDF file.
+def write_measurement(measurement: Measurement, path: Path) -> None:
+    """Write the `dataset` of a measurement as NetCDF.
 
     Parameters
     ----------
     measurement : Measurement
     path : Path
     """
-    tables.write_netcdf(dataset(measurement), path)
+    tables.write_netcdf(measurement_dataset(measurement), path)
 
 
 def write_camera(measurement: Measurement, folder: Path) -> None:
-    """interferogram.tif and frames.tif: 16-bit, with the full scale in their description.
+    """Write interferogram.tif and frames.tif: 16 bits, full scale in the description.
 
     Parameters
     ----------
@@ -233,7 +235,7 @@ def write_camera(measurement: Measurement, folder: Path) -> None:
 
 
 def write_heights(measurement: Measurement, folder: Path, kinds: Iterable[str]) -> None:
-    """height.dat or height.datx: the measured height as a file of Zygo's.
+    """Write the measured height as a Zygo file: height.dat or height.datx.
 
     Parameters
     ----------
@@ -247,7 +249,7 @@ def write_heights(measurement: Measurement, folder: Path, kinds: Iterable[str]) 
 
 
 def write_pictures(measurement: Measurement, folder: Path) -> None:
-    """interferogram.png, and height.png with the residual beside the height.
+    """Write interferogram.png, and height.png with the residual beside the height.
 
     Parameters
     ----------
@@ -259,7 +261,7 @@ def write_pictures(measurement: Measurement, folder: Path) -> None:
     m = measurement
     image = views.interferogram(m.interferogram, m.pitch, wavelength=m.wavelength, title="Interferogram")
     views.save(image, folder / "interferogram.png")
-    left, right = views.pair()
+    left, right = views.side_by_side()
     views.height(m.height, m.pitch, left, title="Height, measured")
     views.residual(m.residual, m.pitch, right, wavelength=m.wavelength, title="Measured − mesh")
     views.save(left, folder / "height.png")

@@ -1,4 +1,4 @@
-"""Standards: scenes whose field on every pixel is known in closed form, to measure errors against."""
+"""Reference scenes whose field on every pixel is known in closed form."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fringetrace import instruments
 from fringetrace.core import ComplexArray, FloatArray, mm, nm, rotation, um, wavenumber
 from fringetrace.geometry import Mesh, forms, shapes
 from fringetrace.optics import Mirror
-from fringetrace.scene import CCD, Beam, Scene, Surface
+from fringetrace.scene import CCD, Beam, Scene, Surface, pixel_centres
 
 WAVELENGTH = 632.8 * nm
 # Gauss points along either side of a pixel: half a wave a pixel is then averaged to 1e-12.
@@ -32,7 +32,7 @@ Height = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class Standard:
-    """A scene with its beam and CCD, and the truth.
+    """Reference scene with its beam, CCD and exact field.
 
     Attributes
     ----------
@@ -55,16 +55,16 @@ class Standard:
 
     @property
     def curved(self) -> bool:
-        """Whether facets only stand for some surface of it."""
+        """Whether facets approximate a curved surface."""
         return any(surface.form is not None for surface in self.scene.surfaces)
 
     @property
     def triangles(self) -> int:
-        """How many there are."""
+        """Number of triangles."""
         return sum(len(surface.mesh.faces) for surface in self.scene.surfaces)
 
     def faceted(self) -> Standard:
-        """The same with the facets for the surface."""
+        """The same scene without exact forms."""
         return replace(self, scene=Scene(tuple(replace(s, form=None) for s in self.scene.surfaces)))
 
     def lit(self, count: int) -> Beam:
@@ -73,7 +73,7 @@ class Standard:
 
 
 def means(field: Callable[[FloatArray, FloatArray], ComplexArray], ccd: CCD, points: int = POINTS) -> Truth:
-    """Mean of a field and of its squared modulus over each pixel, by Gauss points.
+    """Mean field and mean irradiance of each pixel, by Gauss quadrature.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def means(field: Callable[[FloatArray, FloatArray], ComplexArray], ccd: CCD, poi
 
 
 def converging(x: FloatArray, y: FloatArray, focal: float, z: float, start: float) -> ComplexArray:
-    """A plane wave off the paraboloid z = r^2 / 4 f, before its focus: a spherical wave, exactly.
+    """Field of a plane wave reflected by the paraboloid z = r^2 / 4 f: a converging spherical wave.
 
     A ray that comes in at r leaves for the focus at an angle t to the axis with r = 2 f tan(t/2), and
     every path to the focus is start + f long.
@@ -128,7 +128,7 @@ def converging(x: FloatArray, y: FloatArray, focal: float, z: float, start: floa
 
 
 def diverging(x: FloatArray, y: FloatArray, radius: float, z: float, start: float) -> ComplexArray:
-    """A plane wave off a convex sphere with its apex in the origin, lit along its axis.
+    """Field of a plane wave reflected by a convex sphere with its apex in the origin, lit along its axis.
 
     A ray at r meets the sphere at the angle asin(r / R) to its normal and leaves at twice that to the
     axis; r is found from where it meets the plane by Newton's method.
@@ -178,7 +178,7 @@ def _dish(height: Height, side: float, cells: int) -> Mesh:
 
 
 def paraboloid(pixels: int, cells: int) -> Standard:
-    """A paraboloid of f = 150 mm, seen 90 mm before its focus.
+    """Reference scene: a paraboloid of f = 150 mm, seen 90 mm before its focus.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def _facing(start: float, side: float, z: float, width: float, pixels: int) -> t
 
 
 def sphere(pixels: int, cells: int) -> Standard:
-    """A convex sphere of R = 400 mm, seen 80 mm above its apex; see `paraboloid`."""
+    """Reference scene: a convex sphere of R = 400 mm, seen 80 mm above its apex; see `paraboloid`."""
     radius, z, start, side = 400 * mm, 80 * mm, 100 * mm, 3.6 * mm
     beam, ccd = _facing(start, side, z, 4 * mm, pixels)
     return Standard(
@@ -233,7 +233,7 @@ def _michelson(sample: Mesh | Surface, width: float, pixels: int, tilt: float) -
 
 
 def reference(x: FloatArray, tilt: float, arm: float) -> ComplexArray:
-    """The plane wave off a Michelson's reference mirror, in the plane that its CCD sees.
+    """Plane wave of a Michelson's reference mirror, in the plane that its CCD sees.
 
     Parameters
     ----------
@@ -252,8 +252,8 @@ def reference(x: FloatArray, tilt: float, arm: float) -> ComplexArray:
     return np.asarray(-0.5j * math.sqrt(math.cos(2.0 * tilt)) * wave)
 
 
-def newton(pixels: int, cells: int) -> Standard:
-    """Rings of a convex sphere of R = 500 mm against a tilted flat, in a Michelson; see `paraboloid`."""
+def newton_rings(pixels: int, cells: int) -> Standard:
+    """Reference scene: rings of a convex sphere of R = 500 mm against a tilted flat, in a Michelson."""
     radius, width, tilt = 500 * mm, 3 * mm, 0.5e-3
     sample = replace(_ball(radius, 2.0 * width, cells), name="sample")
     scene, beam, ccd = _michelson(sample, width, pixels, tilt)
@@ -266,14 +266,14 @@ def newton(pixels: int, cells: int) -> Standard:
 
 
 def tilt(pixels: int, cells: int) -> Standard:
-    """A flat in a Michelson with its reference tilted by 20 mrad: half a fringe a pixel of 8 um."""
+    """Reference scene: a flat in a Michelson, its reference tilted by 20 mrad: half a fringe per pixel."""
     angle, pitch = 20e-3, 8 * um
     flat = shapes.plate(2.0 * pixels * pitch, 2.0 * pixels * pitch)
     scene, beam, ccd = _michelson(flat, pixels * pitch, pixels, angle)
     arm = 0.5 * ccd.focus
 
     def truth() -> Truth:
-        x = np.asarray((np.arange(pixels) - 0.5 * (pixels - 1)) * pitch, dtype=np.float64)
+        x, _ = pixel_centres((pixels, pixels), pitch)
         slope = math.sin(2.0 * angle)
         own = -0.5j * _turned(np.array(2.0 * arm))
         other = np.sinc(pitch * slope / WAVELENGTH) * reference(x, angle, arm)
@@ -283,8 +283,8 @@ def tilt(pixels: int, cells: int) -> Standard:
     return Standard("steep tilt fringes", scene, beam, ccd, truth)
 
 
-def step(pixels: int, cells: int) -> Standard:
-    """A step of 50 nm, 0.3 rad to the columns, in a Michelson."""
+def step_standard(pixels: int, cells: int) -> Standard:
+    """Reference scene: a step of 50 nm, 0.3 rad to the columns, in a Michelson."""
     width, edge, rise, turn = 6 * mm, 0.4 * mm, 50 * nm, 0.3
     mesh = shapes.step(4 * width, 4 * width, edge, rise).moved(turn=rotation((0, 0, 1), turn))
     scene, beam, ccd = _michelson(mesh, width, pixels, 0.0)
@@ -308,7 +308,7 @@ def _covered(u: FloatArray) -> FloatArray:
 
 
 def valley(pixels: int, cells: int) -> Standard:
-    """Two mirrors tilted towards each other by 0.2 mrad: fringes where their light overlaps."""
+    """Reference scene: two mirrors tilted towards each other by 0.2 mrad, with fringes where they overlap."""
     height, start, angle, pitch = 2.0, 1.5, 0.2e-3, 4 * mm / pixels
     sides = np.array([-9 * mm, 0.0, 9 * mm])
     mesh = shapes.extrude(np.stack([sides, abs(sides) * math.tan(angle)], axis=1), 30 * mm)
@@ -328,8 +328,8 @@ def valley(pixels: int, cells: int) -> Standard:
     return Standard("valley of two mirrors", Scene((Surface(mesh, Mirror()),)), beam, ccd, truth)
 
 
-def corner_cube(pixels: int, cells: int) -> Standard:
-    """A corner cube of 100 mm that sends a plane wave back onto a CCD tilted by 0.2 mrad."""
+def corner_cube_standard(pixels: int, cells: int) -> Standard:
+    """Reference scene: a corner cube of 100 mm that returns a plane wave to a CCD tilted by 0.2 mrad."""
     size, side, lean = 100 * mm, 30 * mm, 0.2e-3
     axis = np.ones(3) / math.sqrt(3.0)
     across = np.array([1.0, -1.0, 0.0]) / math.sqrt(2.0)
@@ -353,9 +353,9 @@ def corner_cube(pixels: int, cells: int) -> Standard:
 STANDARDS: dict[str, Callable[[int, int], Standard]] = {
     "paraboloid": paraboloid,
     "sphere": sphere,
-    "newton": newton,
+    "newton": newton_rings,
     "tilt": tilt,
-    "step": step,
+    "step": step_standard,
     "valley": valley,
-    "corner_cube": corner_cube,
+    "corner_cube": corner_cube_standard,
 }

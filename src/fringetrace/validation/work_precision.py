@@ -1,4 +1,4 @@
-"""Run time against error: methods run on scenes whose truth is known; a table, a picture, a JSON file."""
+"""Work-precision benchmark: run time against error on reference scenes; table, figure and JSON."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ Tracer = Callable[[Scene, Beam, CCD], Paths]
 
 @dataclass(frozen=True)
 class Method:
-    """A way from a scene to the field on its pixels.
+    """Method from a scene to the field on its pixels.
 
     Attributes
     ----------
@@ -54,12 +54,14 @@ class Method:
     quick: tuple[int, ...]
 
     def suits(self, standard: Standard) -> bool:
-        """Whether there is anything to run: flat facets are their own form."""
+        """Whether the method applies: flat facets need no form."""
         return standard.curved or not self.form
 
 
 METHODS = (
-    Method("float32, facets", float32_tracer.trace, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)),
+    Method(
+        "float32, facets", float32_tracer.trace_float32, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)
+    ),
     Method("rays, facets", trace, "rays", False, (64, 128, 256, 512, 800), (24, 48, 96)),
     Method("rays, form", trace, "rays", True, (64, 128, 256, 400), (24, 48, 96)),
     Method("wavefront, facets", trace, "wavefront", False, (4, 8, 16), (4,)),
@@ -69,7 +71,7 @@ METHODS = (
 
 @dataclass(frozen=True)
 class Size:
-    """How large a bench is: pixels and cells of the meshes along either side, and how often each run."""
+    """Size of the benchmark: pixels, mesh cells along either side, repetitions."""
 
     pixels: int
     cells: int
@@ -82,8 +84,8 @@ LONG = 0.5
 
 
 @dataclass(frozen=True)
-class Run:
-    """One run of a method on a standard.
+class StandardRun:
+    """One run of a method on a reference scene.
 
     Attributes
     ----------
@@ -109,7 +111,7 @@ class Run:
 
 
 def phase_error(field: ComplexArray, truth: ComplexArray) -> float:
-    """Phase error in waves, rms over pixels, each weighted with its power.
+    """Phase error in waves, rms over pixels weighted with their power.
 
     Parameters
     ----------
@@ -126,7 +128,7 @@ def phase_error(field: ComplexArray, truth: ComplexArray) -> float:
 
 
 def irradiance_error(image: FloatArray, truth: FloatArray) -> float:
-    """Root of the mean square of the difference, relative to the mean.
+    """Irradiance error, rms over pixels, relative to the mean.
 
     Parameters
     ----------
@@ -139,8 +141,10 @@ def irradiance_error(image: FloatArray, truth: FloatArray) -> float:
     return float(np.sqrt(np.mean((image - truth) ** 2)) / truth.mean())
 
 
-def run(standard: Standard, truth: Truth, method: Method, count: int, repeats: int = 1) -> Run:
-    """Run a method on a standard.
+def run_standard(
+    standard: Standard, truth: Truth, method: Method, count: int, repeats: int = 1
+) -> StandardRun:
+    """Run a method on a reference scene.
 
     Parameters
     ----------
@@ -169,7 +173,7 @@ def run(standard: Standard, truth: Truth, method: Method, count: int, repeats: i
     for _ in range(repeats - 1 if seconds < LONG else 0):
         seconds = min(seconds, once()[0])
     bright = irradiance(paths, WAVELENGTH, method.sum)
-    return Run(
+    return StandardRun(
         standard.title, method.name, count**2, standard.triangles, seconds,
         phase_error(field, truth[0]), irradiance_error(bright, truth[1]),
     )  # fmt: skip
@@ -179,8 +183,8 @@ def runs(
     names: Iterable[str] = tuple(STANDARDS),
     quick: bool = False,
     progress: Callable[[int, int], None] | None = None,
-) -> Iterator[Run]:
-    """All methods on some standards, with more and more rays.
+) -> Iterator[StandardRun]:
+    """Run all methods on reference scenes, with increasing numbers of rays.
 
     Facets that only stand for a smooth surface grow with the rays where the wavefront method is to
     follow them, two rays a facet along either side; the ray sum has them fine from the start.
@@ -204,7 +208,7 @@ def runs(
         For the name of a standard that there is not.
     """
     size = QUICK if quick else FULL
-    chosen = [(name, STANDARDS[name](size.pixels, size.cells)) for name in checked(names)]
+    chosen = [(name, STANDARDS[name](size.pixels, size.cells)) for name in checked_standards(names)]
     plan = [
         (name, standard, method, method.quick if quick else method.full)
         for name, standard in chosen
@@ -222,17 +226,17 @@ def runs(
             if follow:
                 used = STANDARDS[name](size.pixels, count // 2).faceted()
             elif method.name not in begun:  # compiles
-                run(used, truth, method, count)
+                run_standard(used, truth, method, count)
                 begun.add(method.name)
             method.tracer(used.scene, used.lit(1), used.ccd)  # builds what belongs to the scene
-            yield run(used, truth, method, count, size.repeats)
+            yield run_standard(used, truth, method, count, size.repeats)
             done += 1
             if progress is not None:
                 progress(done, total)
 
 
-def checked(names: Iterable[str]) -> tuple[str, ...]:
-    """Names of standards, once they are known to be some.
+def checked_standards(names: Iterable[str]) -> tuple[str, ...]:
+    """Checked names of reference scenes.
 
     Parameters
     ----------
@@ -254,8 +258,8 @@ def checked(names: Iterable[str]) -> tuple[str, ...]:
     return chosen
 
 
-def best(done: Iterable[Run]) -> list[Run]:
-    """The most exact run of each method on each standard, in their order.
+def best(done: Iterable[StandardRun]) -> list[StandardRun]:
+    """Most accurate run of each method on each scene, in their order.
 
     Parameters
     ----------
@@ -265,7 +269,7 @@ def best(done: Iterable[Run]) -> list[Run]:
     -------
     list of Run
     """
-    chosen: dict[tuple[str, str], Run] = {}
+    chosen: dict[tuple[str, str], StandardRun] = {}
     for one in done:
         name = one.standard, one.method
         if name not in chosen or one.waves < chosen[name].waves:
@@ -273,8 +277,8 @@ def best(done: Iterable[Run]) -> list[Run]:
     return list(chosen.values())
 
 
-def table(done: Iterable[Run]) -> str:
-    """The most exact run of each method on each standard, as a Markdown table.
+def markdown_table(done: Iterable[StandardRun]) -> str:
+    """Markdown table of the most accurate run of each method on each scene.
 
     Parameters
     ----------
@@ -295,7 +299,7 @@ def table(done: Iterable[Run]) -> str:
 
 
 def machine() -> dict[str, str | int | None]:
-    """What the bench ran on: processor, system, and versions of what decides the time.
+    """Description of the machine: processor, system, versions of the libraries that decide run time.
 
     Returns
     -------
@@ -310,8 +314,8 @@ def machine() -> dict[str, str | int | None]:
     }
 
 
-def write(done: Iterable[Run], folder: Path) -> None:
-    """All runs with machine and versions as `work_precision.json`, and a picture of them.
+def write(done: Iterable[StandardRun], folder: Path) -> None:
+    """Write all runs as `work_precision.json`, and a figure of them.
 
     Parameters
     ----------
@@ -325,8 +329,8 @@ def write(done: Iterable[Run], folder: Path) -> None:
     views.save(views.comparison(panels(every)), folder / FILES[1])
 
 
-def panels(done: Iterable[Run]) -> dict[str, dict[str, FloatArray]]:
-    """Runs as `views.comparison` draws them.
+def panels(done: Iterable[StandardRun]) -> dict[str, dict[str, FloatArray]]:
+    """Panels of the runs for `views.comparison`.
 
     Parameters
     ----------

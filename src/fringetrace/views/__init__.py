@@ -1,4 +1,4 @@
-"""Plots of arrays, and three-dimensional views of scenes."""
+"""Plots of arrays, and 3D views of scenes."""
 
 import lazy_loader
 

@@ -9,13 +9,13 @@ from .plots.brdf import (
 from .plots.images import (
     height as height,
     interferogram as interferogram,
-    pair as pair,
     phase as phase,
     residual as residual,
     save as save,
+    side_by_side as side_by_side,
 )
 from .plots.spectra import comparison as comparison, spectra as spectra, work_precision as work_precision
 from .scene3d import viewer as viewer
-from .scene3d.describe import itinerary as itinerary
+from .scene3d.describe import describe_path as describe_path
 from .scene3d.subprocess import opengl as opengl
 from .scene3d.viewer import export as export, few as few, page as page, picture as picture, show as show

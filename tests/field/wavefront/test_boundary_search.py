@@ -8,8 +8,9 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import mm
-from fringetrace.field.wavefront import boundary_search, curved_waves, patch_fit, probe, quadtree, visibility
+from fringetrace.field.wavefront import boundary_search, curved_waves, patch_fit, quadtree, visibility
 from fringetrace.geometry import forms, shapes
+from fringetrace.scene import facet_groups
 
 HENE = 632.8e-9
 # An edge is known to 1e-4 of a pixel over its length.
@@ -84,7 +85,7 @@ def test_names_follow_the_form_and_its_parts():
         np.vstack([one.faces, one.faces + len(one.vertices)]),
     )
     surface = ft.Surface(two, ft.Mirror(), "balls", form=forms.Smooth())
-    (parts,) = probe.parted(ft.Scene([surface]))
+    (parts,) = facet_groups.group_facets(ft.Scene([surface]))
     assert (parts < 0).all()
     assert len(np.unique(parts)) == 2
     assert (np.diff(parts)[: len(one.faces) - 1] == 0).all()
@@ -94,7 +95,7 @@ def test_the_caps_of_a_rod_are_facets():
     angle = 2 * math.pi * np.arange(24) / 24
     mesh = shapes.extrude(np.stack([np.cos(angle), np.sin(angle)], axis=1) * mm, 2 * mm, closed=True)
     rod = ft.Surface(mesh, ft.Mirror(), "rod", form=forms.Cylinder((0, 0, 0), (0, 1, 0), 1 * mm))
-    (parts,) = probe.parted(ft.Scene([rod]))
+    (parts,) = facet_groups.group_facets(ft.Scene([rod]))
     caps = parts[parts >= 0]
     assert len(np.unique(caps)) == 2
     assert len(np.unique(parts[parts < 0])) == 1

@@ -67,7 +67,7 @@ def test_rays_go_by_an_edge_on_either_side():
     plate = mirror(shapes.plate(6 * mm, 60 * mm).moved((3.3 * mm, 0, 1 * mm)))
     floor = mirror(shapes.plate(60 * mm, 60 * mm))
     paths, shape = nodes([floor, plate])
-    at, goes_on = feature_edges.beside(paths, shape, 1000)
+    at, goes_on = feature_edges.places_beside_edges(paths, shape, 1000)
     edge = 4.0 + 0.3 / 0.5
     first = np.abs(np.abs(at[:, 0] - edge) - SIDE) < 1e-9
     assert first.all()
@@ -84,16 +84,16 @@ def test_rays_go_by_an_edge_on_either_side():
 
 def test_edges_beside_the_beam_cost_nothing():
     paths, shape = nodes([mirror(shapes.plate(60 * mm, 60 * mm))])
-    at, goes_on = feature_edges.beside(paths, shape, 1000)
+    at, goes_on = feature_edges.places_beside_edges(paths, shape, 1000)
     assert at.shape == (0, 2)
     assert goes_on.shape == (0,)
 
 
 def test_no_more_places_than_asked_for():
     paths, shape = nodes([mirror(shapes.staircase(4 * mm, 60 * mm, 6, 0.01 * mm))])
-    every, _ = feature_edges.beside(paths, shape, 10_000)
+    every, _ = feature_edges.places_beside_edges(paths, shape, 10_000)
     assert len(every) > 50
-    some, goes_on = feature_edges.beside(paths, shape, 50)
+    some, goes_on = feature_edges.places_beside_edges(paths, shape, 50)
     assert len(some) == 50
     assert not goes_on.any()
 
@@ -106,7 +106,7 @@ def test_a_leg_off_a_curved_mirror_is_followed_back():
     form = forms.Conic((0, 0, 0), (0, 0, 1), 2 * focus, conic=-1.0)
     tape = ft.Surface(shapes.plate(0.2 * mm, 60 * mm).moved((1 * mm, 0, up)), ft.Absorber(), "tape")
     paths, shape = nodes([mirror(mesh, form), tape])
-    last = [leg for leg, _ in feature_edges.legs(paths, shape) if np.isinf(leg.reach).all()]
+    last = [leg for leg, _ in feature_edges.segments_near_edges(paths, shape) if np.isinf(leg.reach).all()]
     at, there, near = last[0].nearest(np.array([[0.5 * mm, 0.25 * mm, up]]))
     assert there.all()
     assert near.all()

@@ -73,7 +73,7 @@ def fitted(some, lost=(), shape=(40, 40), arrived=None):
         arrivals.x[ray], arrivals.y[ray], arrivals.slope_x[ray], arrivals.slope_y[ray], arrivals.length[ray],
         None, arrivals.direction[ray], arrivals.last[ray],
     )  # fmt: skip
-    result = patch_fit.fitted(at, low, high, ray, kept, np.full(len(ray), 2.0 + 0j), 7.0, shape)
+    result = patch_fit.fitted(at, low, high, ray, kept, np.full((len(ray), 1), 2.0 + 0j), 7.0, shape)
     return at, low, high, *result
 
 
@@ -123,7 +123,7 @@ def test_what_is_no_cubic_tells():
 def fit():
     some = pieces(WHOLE, LEFT)
     _, low, high, coefficients, turns, _, _ = fitted(some)
-    return patch_fit.Fit(some, np.arange(2), coefficients, turns, low, high)
+    return patch_fit.PatchFit(some, np.arange(2), coefficients, turns, low, high)
 
 
 def test_a_fit_knows_its_pieces_on_its_patches():

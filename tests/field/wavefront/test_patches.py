@@ -9,7 +9,7 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import mm, nm
-from fringetrace.field import pixel_quadrature
+from fringetrace.field import sample_points
 from fringetrace.field.wavefront import patches
 
 # Differences of numbers near 1 cancel to a few roundings.
@@ -105,9 +105,9 @@ def test_what_is_refused():
 
 @pytest.mark.parametrize("cycles", [0.0, 0.05, 0.3, 1.0, 3.0, 7.7])
 def test_gauss_points_resolve_their_fringes(cycles):
-    order = int(pixel_quadrature.gauss_order(np.array(cycles)))
-    nodes, weights = pixel_quadrature.gauss_table(np.array([order]))
+    order = int(sample_points.gauss_order(np.array(cycles)))
+    nodes, weights = sample_points.gauss_table(np.array([order]))
     wave = np.exp(2j * math.pi * cycles * nodes[order, :order])
     exact = np.sinc(cycles) * np.exp(1j * math.pi * cycles)
-    assert abs(wave @ weights[order, :order] - exact) < 2 * pixel_quadrature.ERROR
-    assert order < pixel_quadrature.MOST
+    assert abs(wave @ weights[order, :order] - exact) < 2 * sample_points.ERROR
+    assert order < sample_points.MOST

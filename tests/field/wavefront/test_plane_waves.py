@@ -10,8 +10,10 @@ from hypothesis import Phase, given, settings, strategies as st
 import fringetrace as ft
 from fringetrace import instruments, mm, nm
 from fringetrace.core.vectors import rotation
-from fringetrace.field.wavefront import boundary_search, plane_waves, probe, visibility
+from fringetrace.field.wavefront import boundary_search, plane_waves, visibility
 from fringetrace.geometry import shapes
+from fringetrace.optics.gratings import Grating
+from fringetrace.scene import facet_groups
 from fringetrace.tracing.rays import launch, launch_at
 
 HENE = 632.8 * nm
@@ -33,7 +35,7 @@ def flux(paths):
 
 def test_triangles_of_one_plane_have_one_number():
     mesh = shapes.staircase(3 * mm, 2 * mm, 3, 70 * nm).moved((1e-3, 0, 2e-3), rotation((1, 2, 3), 0.7))
-    (planes,) = probe.parted(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
+    (planes,) = facet_groups.group_facets(ft.Scene([ft.Surface(mesh, ft.Mirror())]))
     assert (planes[::2] == planes[1::2]).all()
     assert len(np.unique(planes)) == 5
 
@@ -81,8 +83,8 @@ def test_a_mirror_off_the_camera_brings_nothing():
 
 def test_a_corner_inside_a_cell_is_found_by_quartering():
     mesh = shapes.plate(1.07 * mm, 1.07 * mm).moved((0.4 * mm, 0.4 * mm, 0))
-    ((wave, region),) = plane_waves.waves(visibility.survey(lit(mesh, (5, 5))))
-    assert abs(wave.amplitude) == pytest.approx(1.0, rel=ROUNDING)
+    ((wave, region),) = plane_waves.plane_waves_of(visibility.survey(lit(mesh, (5, 5))))
+    assert abs(wave.amplitude) == pytest.approx([1.0], rel=ROUNDING)
     assert (region.pieces[:, 2] - region.pieces[:, 0]).min() == 0.5**boundary_search.DEPTH
     # each quartering of the four corners leaves a few pieces, not all of the edge
     assert len(region.pieces) < 4 * 4 * (boundary_search.DEPTH + 2)
@@ -90,7 +92,7 @@ def test_a_corner_inside_a_cell_is_found_by_quartering():
 
 def test_a_straight_edge_costs_one_piece_a_cell():
     step = shapes.step(9 * mm, 9 * mm, 0.1 * mm, 80 * nm).moved(turn=rotation((0, 0, 1), 0.4))
-    found = list(plane_waves.waves(visibility.survey(lit(step))))
+    found = list(plane_waves.plane_waves_of(visibility.survey(lit(step))))
     assert len(found) == 2
     for _, region in found:
         assert (region.pieces[:, 2:4] - region.pieces[:, :2] == 1.0).all()
@@ -101,7 +103,7 @@ def test_parts_of_the_paths_bring_their_part_of_the_light():
         shapes.step(9 * mm, 9 * mm, 0.4 * mm, 80 * nm), aperture=3 * mm, pixels=(8, 9)
     )
     paths = bench.trace().detected
-    visits = paths.visits(bench.reference)
+    visits = paths.visits(bench.arms.reference.surface)
     parts = [ft.complex_field(paths.where(visits == n), HENE, "wavefront") for n in (0, 1)]
     assert abs(parts[1]) == pytest.approx(np.full((8, 9), 0.5), abs=1e-9)
     whole = ft.complex_field(paths, HENE, "wavefront")
@@ -132,3 +134,57 @@ def test_what_is_refused():
         ft.irradiance(replace(paths, ccd=None), HENE)
     with pytest.raises(ValueError, match="paths of a Beam, got those of Rays"):
         ft.irradiance(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE, "wavefront")
+
+
+def waves_of(surfaces, collapsed, order, ccd, polarisation=None):
+    """Plane waves of all ways of some bounces, as they are and with segments of no length."""
+    beam = ft.Beam((0, 0, 5 * mm), (0, 0, -1), (0, 1, 0), (1 * mm, 1 * mm), (3, 3), polarisation=polarisation)
+    paths = ft.trace(ft.Scene(surfaces, medium=1.0), beam, ccd, record=True, wavelength=HENE)
+    ways = np.flatnonzero((paths.bounces == order) & (paths.fate == ft.Fate.DETECTED) & (paths.ray == 4))
+    points = paths.points.copy()
+    for k in collapsed:
+        points[ways, k + 1] = points[ways, k]
+    starts = None if paths.departures is None else points[:, :-1].copy()
+    touching = replace(paths, points=points, departures=starts)
+    assert len(ways)
+    return [
+        [plane_waves._wave(some, row, np.uint64(1), np.zeros(2), beam, ccd) for some in (paths, touching)]
+        for row in ways
+    ]
+
+
+def alike(one, other):
+    assert other.matrix == pytest.approx(one.matrix, rel=ROUNDING)
+    assert other.gradient == pytest.approx(one.gradient, abs=ROUNDING * mm)
+    assert other.amplitude == pytest.approx(one.amplitude, rel=ROUNDING)
+
+
+BELOW = ft.CCD((0, 0, -5 * mm), (0, 0, 1), (0, 1, 0), 0.1 * mm, (8, 8))
+ABOVE = ft.CCD((0, 0, 8 * mm), (0, 0, -1), (0, 1, 0), 0.5 * mm, (8, 8))
+
+
+def plate(interface, z, name, **sides):
+    return ft.Surface(shapes.plate(4 * mm, 4 * mm).moved((0, 0, z)), interface, name, **sides)
+
+
+def test_segments_of_no_length_divide_nothing():
+    """Between faces at the same place light goes on as its branches say."""
+    glass = [plate(ft.Dielectric(), -z, f"{z}", front=n, back=m) for z, n, m in (
+        (0.0, 1.0, 1.5), (1e-6, 1.5, 1.7), (1e-3, 1.7, 1.0),
+    )]  # fmt: skip
+    tilted = [surface.moved(turn=rotation((1, 0, 0), 0.1)) for surface in glass]
+    for one, other in waves_of(tilted, [1], 3, BELOW):
+        alike(one, other)
+
+
+@pytest.mark.parametrize("polarisation", [None, (1.0, 0.5j)])
+def test_behind_an_element_the_direction_is_what_it_makes_of_the_light(polarisation):
+    grating = Grating((1, 0, 0), 20e-6, orders=(0, 1))
+    top, tiny = plate(grating, 0.0, "grating"), 1e-9
+    for below, order, ccd in (
+        (plate(ft.Mirror(), -tiny, "mirror"), 3, ABOVE),
+        (plate(ft.Dielectric(), -tiny, "glass", back=1.5), 2, BELOW),
+        (plate(grating, -tiny, "other grating"), 2, BELOW),
+    ):
+        for one, other in waves_of([top, below], range(1, order), order, ccd, polarisation):
+            alike(one, other)

@@ -8,10 +8,11 @@ import fringetrace as ft
 from fringetrace import mm
 from fringetrace.field.wavefront import probe as probes, visibility
 from fringetrace.geometry import forms, shapes
+from fringetrace.scene import facet_groups
 
 
-def probe(*blockers, **options):
-    return visibility.survey(traced(*blockers), **options).probe
+def probe(*blockers):
+    return visibility.survey(traced(*blockers)).probe
 
 
 def test_a_probe_tells_where_light_takes_a_sequence():
@@ -45,13 +46,6 @@ def test_names_tell_parts_apart_that_keys_do_not():
     assert names[0] == names[1] != names[2]
 
 
-def test_without_half_wave_loss_amplitudes_keep_their_sign():
-    at = np.array([[1.0, 1.0]])
-    for loss, sign in ((True, -1.0), (False, 1.0)):
-        paths, rows, _, _ = probe(half_wave_loss=loss).paths(at)
-        assert paths.amplitude[rows] == pytest.approx([sign])
-
-
 def test_edges_are_known_to_a_part_of_the_scene():
     # 20 mm of scene, cells of half a millimetre
     assert probe().fuzz == pytest.approx(probes.FUZZ * 20 / 0.5 * np.ones(2))
@@ -72,14 +66,14 @@ def test_a_profile_is_that_of_the_place():
 
 def test_parts_are_kept_with_their_scene():
     scene = ft.Scene([ft.Surface(shapes.plate(2 * mm, 1 * mm), ft.Mirror())])
-    assert probes.parted(scene) is probes.parted(scene)
+    assert facet_groups.group_facets(scene) is facet_groups.group_facets(scene)
 
 
 def test_a_flat_form_is_a_facet():
     """A conic without curvature at its edge still is a form: below 0; plates are 0 or more."""
     plate = shapes.plate(4 * mm, 4 * mm)
     form = forms.Conic((0, 0, 0), (0, 0, 1), np.inf)
-    flat, formed = probes.parted(
+    flat, formed = facet_groups.group_facets(
         ft.Scene([ft.Surface(plate, ft.Mirror(), "a"), ft.Surface(plate, ft.Mirror(), "b", form=form)])
     )
     assert (flat == 0).all()
@@ -95,6 +89,6 @@ def test_waves_beside_media_that_absorb_are_not_plane():
     gold = ft.Scene([ft.Surface(box, ft.Metal(), "gold", back="gold")])
     murk = ft.Scene([ft.Surface(box, ft.Mirror(), "mirror")], medium=1.3 + 1e-9j)
     for scene, plane in ((smoke, False), (clear, True), (gold, True), (murk, False)):
-        (parts,) = probes.parted(scene)
+        (parts,) = facet_groups.group_facets(scene)
         assert len(np.unique(parts)) == 6
         assert (parts >= 0).all() if plane else (parts < 0).all()

@@ -8,7 +8,7 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import um
-from fringetrace.field import pixel_quadrature
+from fringetrace.field import sample_points
 from fringetrace.field.wavefront import fold_branches, patches, uniform_airy
 
 R, LAM = 300 * um, 0.06 * um
@@ -23,7 +23,7 @@ def folded(mirror, z=DEPTH):
     (sheet,) = patches.sheets(arrivals.reflected(beam, ccd, mirror))
     part = patches.cells(sheet, ccd)
     unit = beam.area / pitch**2
-    return uniform_airy.folds(part.coefficients, part.leaves, part.folded, part.turns, part.place, LAM, unit)
+    return uniform_airy.folds(part, LAM, unit)
 
 
 def test_seeds_lie_on_the_caustic():
@@ -49,7 +49,7 @@ def test_a_sheet_without_folds_has_no_seeds():
 
 def test_the_pixels_beside_a_fold_have_points_for_its_first_fringe():
     sheet = folded(arrivals.cylinder(R))
-    points = pixel_quadrature.samples(np.ones((1, 64), dtype=np.int64), 0)
+    points = sample_points.samples(np.ones((1, 64), dtype=np.int64), 0)
     slope = np.tile([np.inf, -np.inf, np.inf, -np.inf], (64, 1))
     uniform_airy.light(sheet, points, slope)
     spans = slope[:, 1] - slope[:, 0]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from fringetrace.optics.materials.dispersion import FORMS, Formula, Table, checked_range
+from fringetrace.optics.materials.dispersion import FORMS, IndexFormula, IndexTable, checked_range
 
 W = np.array([0.5, 1.0, 2.0])
 
@@ -44,23 +44,23 @@ def test_every_form_beside_its_formula():
     }  # fmt: skip
     assert set(cases) == set(FORMS)
     for form, (coefficients, expected) in cases.items():
-        got = Formula(form, coefficients).at(np.full((2, 1), w))
+        got = IndexFormula(form, coefficients).at(np.full((2, 1), w))
         assert got.shape == (2, 1)
         assert got == pytest.approx(expected, rel=1e-14), form
 
 
 def test_one_pole_of_formula_4():
-    assert Formula("formula 4", (2.2, 0.1, 2.0, 0.2, 2.0)).at(W) == pytest.approx(
+    assert IndexFormula("formula 4", (2.2, 0.1, 2.0, 0.2, 2.0)).at(W) == pytest.approx(
         np.sqrt(2.2 + 0.1 * W**2 / (W**2 - 0.04)), rel=1e-14
     )
 
 
 def test_no_index_within_a_resonance():
-    assert np.isnan(Formula("formula 2", (0.0, 1.0, 4.0)).at(np.array([1.9]))).all()
+    assert np.isnan(IndexFormula("formula 2", (0.0, 1.0, 4.0)).at(np.array([1.9]))).all()
 
 
 def test_tables_run_straight():
-    table = Table((0.4, 0.6, 1.0), (1.5, 1.4, 1.6))
+    table = IndexTable((0.4, 0.6, 1.0), (1.5, 1.4, 1.6))
     assert table.range == (0.4, 1.0)
     assert table.at(np.array([[0.4, 0.5], [0.8, 1.0]])) == pytest.approx(np.array([[1.5, 1.45], [1.5, 1.6]]))
 
@@ -78,7 +78,7 @@ def test_tables_run_straight():
 )
 def test_bad_formulas(form, coefficients, limits, message):
     with pytest.raises(ValueError, match=message):
-        Formula(form, coefficients, limits)
+        IndexFormula(form, coefficients, limits)
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_bad_formulas(form, coefficients, limits, message):
 )
 def test_bad_tables(wavelength, value, message):
     with pytest.raises(ValueError, match=message):
-        Table(wavelength, value)
+        IndexTable(wavelength, value)
 
 
 def test_any_range_is_one_of_none():

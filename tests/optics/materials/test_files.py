@@ -5,7 +5,7 @@ import pytest
 
 from fringetrace import nm, um
 from fringetrace.optics.materials import files
-from fringetrace.optics.materials.dispersion import Formula, Table
+from fringetrace.optics.materials.dispersion import IndexFormula, IndexTable
 from fringetrace.optics.materials.named_materials import load
 
 PAGE = """
@@ -39,7 +39,7 @@ def written(folder, name, text):
 )
 def test_csv_with_its_unit(tmp_path, text):
     unit = "nm" if text.startswith("wl") else None
-    n, kappa, _ = files.read_csv(written(tmp_path, "a.csv", text), unit)
+    n, kappa, _ = files.read_index_csv(written(tmp_path, "a.csv", text), unit)
     assert n.wavelength == kappa.wavelength == pytest.approx((0.4, 0.6), rel=1e-15)
     assert (n.value, kappa.value) == ((1.5, 1.4), (0.1, 0.2))
 
@@ -54,8 +54,8 @@ def test_csv_without_words(tmp_path):
 def test_page_of_refractiveindex_info(tmp_path):
     path = written(tmp_path, "page.yml", PAGE)
     n, kappa, source = files.read_yaml(path)
-    assert isinstance(n, Formula)
-    assert isinstance(kappa, Table)
+    assert isinstance(n, IndexFormula)
+    assert isinstance(kappa, IndexTable)
     assert source == "A. Author. J. Opt. 1 (1999)"
     glass = load(path, name="glass")
     assert glass.index(587.5618 * nm).real == pytest.approx(1.5168, abs=0.5e-5)
@@ -128,5 +128,5 @@ def test_other_files(tmp_path):
 
 
 def test_what_is_read_is_float64(tmp_path):
-    n, *_ = files.read_csv(written(tmp_path, "a.csv", "0.1,1\n0.3,2\n"), "um")
+    n, *_ = files.read_index_csv(written(tmp_path, "a.csv", "0.1,1\n0.3,2\n"), "um")
     assert n.at(np.array([0.2])).dtype == np.float64

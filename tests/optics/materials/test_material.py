@@ -7,7 +7,7 @@ import pytest
 
 from fringetrace import nm, um
 from fringetrace.optics import materials as m
-from fringetrace.optics.materials.dispersion import Formula
+from fringetrace.optics.materials.dispersion import IndexFormula
 
 D = 587.5618 * nm  # the helium line of glass catalogues
 
@@ -69,7 +69,7 @@ def test_resonances_of_sellmeier(given):
 
 
 def test_n_and_kappa_apart():
-    n, kappa = m.GOLD.n, Formula("exponential", (1.0, 1.0), (10.0, 20.0))
+    n, kappa = m.GOLD.n, IndexFormula("exponential", (1.0, 1.0), (10.0, 20.0))
     with pytest.raises(ValueError, match="x: expected n and kappa over common wavelengths, got"):
         m.Material("x", n, kappa)
 

@@ -9,7 +9,7 @@ from fringetrace.core import tables
 from fringetrace.scattering import colour
 from fringetrace.views.plots import colour_plots
 
-W = colour.samples()
+W = colour.resolving_wavelengths()
 WHITE = colour.white()
 
 
@@ -57,7 +57,7 @@ def test_a_mirrored_sphere_has_the_colour_of_each_angle():
     assert picture[50, 50] == pytest.approx(0.0, abs=1e-12)
     assert picture[50, 75] == pytest.approx(WHITE * np.arcsin(50 / 101) / (np.pi / 2))
     assert np.isnan(picture[0, 0]).all()
-    ax = colour_plots.sphere(picture, title="ball")
+    ax = colour_plots.draw_sphere(picture, title="ball")
     shown = np.asarray(ax.images[0].get_array())
     assert shown[0, 0] == pytest.approx(colour_plots.BEHIND)
     assert shown[50, 75] == pytest.approx(colour.srgb(picture[50, 75]))
@@ -70,7 +70,9 @@ def test_spectra_with_measured_ones_laid_over():
         {"sample": (["feather"], ""), "wavelength": (np.array([400, 500, 600]) * nm, "m")},
         name="reflectance", unit="1",
     )  # fmt: skip
-    ax = colour_plots.spectrum([np.full(95, 0.5), np.full(95, 0.2)], W, labels=["a", "b"], measured=sample)
+    ax = colour_plots.coloured_spectra(
+        [np.full(95, 0.5), np.full(95, 0.2)], W, labels=["a", "b"], measured=sample
+    )
     assert [line.get_label() for line in ax.lines] == ["a", "b", "feather"]
     assert ax.lines[2].get_xdata() == pytest.approx([400, 500, 600])
     (rainbow,) = ax.child_axes
@@ -80,4 +82,4 @@ def test_spectra_with_measured_ones_laid_over():
     assert colours[np.searchsorted(at, 530)].argmax() == 1
     assert colours[np.searchsorted(at, 450)].argmax() == 2
     with pytest.raises(ValueError, match="expected as many values as the 95 wavelengths"):
-        colour_plots.spectrum(np.ones(3), W)
+        colour_plots.coloured_spectra(np.ones(3), W)

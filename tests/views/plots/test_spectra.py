@@ -119,7 +119,7 @@ def test_work_that_cannot_be_drawn():
 
 
 def test_cells_reach_halfway_to_their_neighbours():
-    assert spectra.edges([0.0, 1.0, 3.0], 3, "x").tolist() == [-0.5, 0.5, 2.0, 4.0]
+    assert spectra.cell_edges([0.0, 1.0, 3.0], 3, "x").tolist() == [-0.5, 0.5, 2.0, 4.0]
     for places in ([1.0], [1.0, 1.0], [2.0, 1.0]):
         with pytest.raises(ValueError, match=r"x: expected \d increasing numbers \(at least 2\)"):
-            spectra.edges(places, len(places), "x")
+            spectra.cell_edges(places, len(places), "x")

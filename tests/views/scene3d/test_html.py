@@ -61,7 +61,7 @@ def test_a_page_loads_nothing_and_names_no_address(written):
 def test_a_page_holds_legs_phases_and_every_path_in_words(bench, written):
     data = data_of(written)
     rays = data["rays"]
-    view = viewer.view(bench, None, wavelength=633 * nm, sweep=viewer.SWEEP)
+    view = viewer.scene_view(bench, None, wavelength=633 * nm, sweep=viewer.SWEEP)
     path, bounce = view.strands.legs()
     np.testing.assert_array_equal(unpacked(rays["path"]), path)
     ends = unpacked(rays["ends"]).reshape(-1, 2, 3) * view.stage.metres
@@ -71,7 +71,7 @@ def test_a_page_holds_legs_phases_and_every_path_in_words(bench, written):
     assert np.abs(off - np.round(off)).max() <= 0.5 / 256 + 1e-9
     assert rays["wavelengths"][rays["chosen"]] == 633 * nm
     assert len(rays["texts"]) == len(view.strands)
-    assert rays["texts"][5] == views.itinerary(bench.sampled((9, 12)), int(view.strands.row[5]), 633 * nm)
+    assert rays["texts"][5] == views.describe_path(bench.sampled((9, 12)), int(view.strands.row[5]), 633 * nm)
     assert set(rays["ways"]) == {"route", "beam", "bounce", "length", "phase", "fate", "power"}
     assert rays["ways"]["length"]["title"] == "optical path / mm"
     assert rays["ways"]["route"]["names"][0].startswith("splitter, sample")
@@ -102,7 +102,7 @@ def test_an_image_of_many_pixels_is_binned_and_keeps_its_mean():
 def test_a_surface_of_many_triangles_is_simpler_and_says_so(monkeypatch):
     monkeypatch.setattr(html, "FACES", 100)
     ball = ft.shapes.icosphere(1 * mm, 2)
-    view = viewer.view(ft.Scene([ft.Surface(ball, ft.Mirror(), "ball")]))
+    view = viewer.scene_view(ft.Scene([ft.Surface(ball, ft.Mirror(), "ball")]))
     solid = html.contents(view)["figure"]["data"][0]
     found = re.fullmatch(r"ball \(mirror\), (\d+) of 320 triangles", solid["name"])
     assert 50 < int(found[1]) <= 100

@@ -6,7 +6,6 @@ import pytest
 import fringetrace as ft
 from fringetrace import instruments, mm, nm
 from fringetrace.geometry.shapes import plate
-from fringetrace.instruments.arms import Mark
 from fringetrace.views.scene3d.polylines import start_of, strands
 
 # A phase from a path of centimetres by two ways: some roundings of the path, in turns.
@@ -59,8 +58,8 @@ def test_where_light_is_bent_elsewhere_there_is_one_wavelength():
 
 
 def test_a_phase_step_turns_the_reference_once_it_is_met(bench, paths):
-    shown = strands(paths, reference=Mark(bench.reference))
-    met = (shown.surface == bench.reference).any(axis=1)
+    shown = strands(paths, reference=bench.arms.reference)
+    met = (shown.surface == bench.arms.reference.surface).any(axis=1)
     assert 0 < met.sum() < len(met)
     assert not shown.steps[~met].any()
     np.testing.assert_array_equal(shown.steps[met], [[0, 0, 1, 1, 1]] * met.sum())

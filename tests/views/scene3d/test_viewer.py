@@ -16,7 +16,7 @@ def bench():
 
 
 def test_a_bench_brings_rays_image_and_reference(bench):
-    view = viewer.view(bench, wavelength=633 * nm, step=0.5)
+    view = viewer.scene_view(bench, wavelength=633 * nm, step=0.5)
     assert view.strands.caption == "108 rays"
     assert view.strands.steps.max() == 1
     (chip,) = [panel for panel in view.stage.panels if panel.name == "CCD"]
@@ -29,7 +29,7 @@ def test_a_bench_brings_rays_image_and_reference(bench):
 
 
 def test_names_stand_clear_of_each_other(bench):
-    labels = layout.labels(viewer.view(bench).stage)
+    labels = layout.labels(viewer.scene_view(bench).stage)
     assert [name for name, _, _ in labels] == ["splitter", "sample", "reference", "source", "CCD"]
     right, up, _ = layout.axes_of_view()
     flat = np.array([(spot @ right, spot @ up) for _, spot, _ in labels])
@@ -38,15 +38,15 @@ def test_names_stand_clear_of_each_other(bench):
 
 
 def test_the_scale_bar_is_a_round_part_of_the_width(bench):
-    found = viewer.view(bench).stage
+    found = viewer.scene_view(bench).stage
     assert found.bar_label == "5 mm"
     assert np.linalg.norm(found.bar[1] - found.bar[0]) == pytest.approx(5 * mm)
 
 
 def test_legs_part_along_what_is_least(bench):
-    view = viewer.view(bench, explode=0.5)
+    view = viewer.scene_view(bench, explode=0.5)
     assert np.flatnonzero(view.shift).tolist() == [1]
-    np.testing.assert_array_equal(viewer.view(bench, explode=(0, 0, 1 * mm)).shift, [0, 0, 1 * mm])
+    np.testing.assert_array_equal(viewer.scene_view(bench, explode=(0, 0, 1 * mm)).shift, [0, 0, 1 * mm])
 
 
 def test_surfaces_look_like_what_they_do():
@@ -61,13 +61,15 @@ def test_surfaces_look_like_what_they_do():
     assert (glass[0], palette.look(ft.Surface(square, ft.Metal(), back=0.1 + 3j))[0]) == ("glass", "metal")
     assert glass[2] < 0.5 < looks["mirror"][2]
     assert (
-        viewer.view(ft.Scene([ft.Surface(square, ft.Mirror(), "one")]), surfaces="name").stage.legend[0][0]
+        viewer.scene_view(ft.Scene([ft.Surface(square, ft.Mirror(), "one")]), surfaces="name").stage.legend[
+            0
+        ][0]
         == "one"
     )
 
 
 def test_phases_are_coloured_in_a_circle(bench):
-    view = viewer.view(bench, wavelength=633 * nm, colour="phase")
+    view = viewer.scene_view(bench, wavelength=633 * nm, colour="phase")
     table = palette.scale(view.strands, "phase", "mm", mm).table().astype(int)
     steps = np.abs(np.diff(table, axis=0, append=table[:1])).sum(axis=1)
     assert steps.max() < 16  # no seam where it closes
@@ -80,10 +82,10 @@ def test_phases_are_coloured_in_a_circle(bench):
 
 def test_what_does_not_fit_is_refused(bench):
     with pytest.raises(ValueError, match="colour: expected a wavelength for 'phase', got None"):
-        viewer.view(bench, colour="phase")
+        viewer.scene_view(bench, colour="phase")
     with pytest.raises(ValueError, match="surfaces: expected 'interface' or 'name', got 'kind'"):
-        viewer.view(bench, surfaces="kind")
+        viewer.scene_view(bench, surfaces="kind")
     with pytest.raises(ValueError, match=r"image: expected that of the CCD, shape \(6, 8\), got \(8, 6\)"):
-        viewer.view(bench, image=np.zeros((8, 6)))
+        viewer.scene_view(bench, image=np.zeros((8, 6)))
     with pytest.raises(ValueError, match="image: expected paths traced onto a CCD"):
-        viewer.view(bench.scene, image=np.zeros((6, 8)))
+        viewer.scene_view(bench.scene, image=np.zeros((6, 8)))

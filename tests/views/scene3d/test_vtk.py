@@ -177,7 +177,7 @@ def test_the_ccd_shows_its_image_the_right_way_up(missing, camera):
     image[0, :] = 0.5  # the lowest row,
     image[3, 3] = 1.0  # and the corner at the end of u and v
     scene, paths = camera
-    seen = Seen(viewer.view(scene, paths, image=image))
+    seen = Seen(viewer.scene_view(scene, paths, image=image))
     u, v, _ = paths.ccd.axes
     for row in range(4):
         for column in range(4):
@@ -191,12 +191,12 @@ def test_rays_have_their_colours_where_they_are(missing, camera):
         pytest.skip(missing)
     scene, paths = camera
     middle, moved = np.array([1 * mm, -1 * mm, 1 * mm]), np.array([-3 * mm, -1 * mm, 1 * mm])
-    whole = Seen(viewer.view(scene, paths, colour="fate"))
+    whole = Seen(viewer.scene_view(scene, paths, colour="fate"))
     assert whole.near(middle, "#E69F00")
-    apart = Seen(viewer.view(scene, paths, colour="bounce", explode=(-4 * mm, 0, 0)))
+    apart = Seen(viewer.scene_view(scene, paths, colour="bounce", explode=(-4 * mm, 0, 0)))
     assert apart.near(middle, "#440154")
     assert apart.near(moved, "#FDE725")
-    first = Seen(viewer.view(scene, paths, colour="bounce", explode=(-4 * mm, 0, 0), upto=0))
+    first = Seen(viewer.scene_view(scene, paths, colour="bounce", explode=(-4 * mm, 0, 0), upto=0))
     assert first.near(middle, "#440154")
     assert not first.near(moved, "#FDE725")
 
@@ -207,10 +207,10 @@ def test_glass_is_seen_through_and_a_plane_cuts(missing, camera):
         pytest.skip(missing)
     scene, _ = camera
     ball, floor = np.array([6 * mm, 0, 2 * mm]), np.array([-1.5 * mm, 0.5 * mm, 0])
-    whole = Seen(viewer.view(scene, None))
+    whole = Seen(viewer.scene_view(scene, None))
     assert 60 < whole.at(ball).min() < 245  # white behind green of low opacity
     assert whole.at(floor).max() < 230
-    cut = Seen(viewer.view(scene, None, clip=((1, 0, 0), (3 * mm, 0, 0))))
+    cut = Seen(viewer.scene_view(scene, None, clip=((1, 0, 0), (3 * mm, 0, 0))))
     assert cut.at(ball).min() > 200
     assert (cut.at(floor) == whole.at(floor)).all()
 

@@ -17,7 +17,7 @@ def opened():
         plate(8 * mm, 8 * mm), aperture=6 * mm, pixels=(6, 8), reference_tilt=(200e-6, 0.0)
     )
     view = viewer._interactive(bench, None, {"wavelength": 633 * nm, "colour": "phase"})
-    return window.furnished(view, vtk.empty((800, 600)))
+    return window.furnish(view, vtk.empty((800, 600)))
 
 
 @pytest.mark.slow

@@ -1,5 +1,1 @@
 """Wavefronts reconstructed from neighbouring rays, cut at edges, uniform across folds."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""Where the light of a sequence ends on the beam's grid: cells cut along edges, which rays find."""
+"""Boundary search: cells of the beam's grid cut along the edges of a surface sequence, by new rays."""
 
 from __future__ import annotations
 
@@ -99,7 +99,7 @@ def _straight(
 
 
 def main_axis(chord: FloatArray) -> npt.NDArray[np.int64]:
-    """The axis (0 columns, 1 rows) that chords rather lie along."""
+    """Axis (0 columns, 1 rows) that chords lie closer to."""
     along = np.abs(chord[:, 1] - chord[:, 0])
     return (along[:, 1] > along[:, 0]).astype(np.int64)
 
@@ -189,7 +189,7 @@ def _strips(squares: Squares, axis: Array, owner: Array, chord: FloatArray, leve
 
 
 def cut(probe: Probe, names: Array, squares: Squares, witnesses: Witnesses | None = None) -> Pieces:
-    """Cells cut along the edges between lit and dark corners; quartered where one edge will not do.
+    """Cells cut along the edges between lit and dark corners; quartered where one edge is not enough.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Curved sheets of traced beams: patches between the nodes, and at edges patches fitted to rays inside."""
+"""Curved wavefronts: patches between grid nodes, and patches fitted to rays at edges."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
 from fringetrace.field.wavefront.boundary_search import cut
-from fringetrace.field.wavefront.patch_fit import Fit, fitted, places
+from fringetrace.field.wavefront.patch_fit import PatchFit, fitted, places
 from fringetrace.field.wavefront.patches import (
-    Cells,
+    PatchCells,
     Sheet,
     arrivals,
     branch_turns,
@@ -25,6 +25,7 @@ from fringetrace.field.wavefront.quadtree import PIXEL, STRAIGHT, Pieces, Square
 from fringetrace.field.wavefront.ray_tubes import differences
 from fringetrace.field.wavefront.visibility import Survey, Witnesses
 from fringetrace.scene import CCD
+from fringetrace.tracing import components
 
 # Segments that an edge within a cell is drawn with, at most.
 SEGMENTS = 64
@@ -38,8 +39,8 @@ LOST = 0.1
 STENCIL = 5
 
 
-def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
-    """Sheets that met surfaces with a form, cut along their edges.
+def curved(survey: Survey) -> tuple[list[PatchCells], FloatArray]:
+    """Curved wavefronts off surfaces with a form, cut along their edges.
 
     Parameters
     ----------
@@ -70,7 +71,9 @@ def curved(survey: Survey) -> tuple[list[Cells], FloatArray]:
         mine = pieces.part(plain & (pieces.wave == n))
         row, column = np.divmod(mine.cell, probe.beam.shape[1])
         turns = branch_turns(grid.turns, areas[n])[row, column]
-        patched = Fit(mine, np.arange(len(row)), coefficients[n][row, column], turns, mine.low, mine.high)
+        patched = PatchFit(
+            mine, np.arange(len(row)), coefficients[n][row, column], turns, mine.low, mine.high
+        )
         found.append(_together([patched, *fit], grid.base, probe.ccd))
         drawn += [_drawn(part, probe) for part in (patched, *fit)]
     return found, np.concatenate(drawn)
@@ -81,7 +84,7 @@ def _grid(survey: Survey, index: int) -> Sheet:
     probe = survey.probe
     found = sheet(survey.paths, survey.rows[index], probe.ccd, survey.shape)
     row, column = np.indices(survey.shape)
-    light = profile(probe.beam, np.stack([column.ravel(), row.ravel()], axis=1)).reshape(survey.shape)
+    light = profile(probe.beam, np.stack([column.ravel(), row.ravel()], axis=1)).reshape(*survey.shape, 1)
     return replace(found, amplitude=found.amplitude * light)
 
 
@@ -159,9 +162,9 @@ def _plain(
 
 def _fits(
     probe: Probe, names: Array, squares: Squares, pieces: Pieces, bases: list[float], witnesses: Witnesses
-) -> list[list[Fit]]:
+) -> list[list[PatchFit]]:
     """Fits of the cells of pieces, and of their quarters where need be; tables for each sheet."""
-    tables: list[list[Fit]] = [[] for _ in bases]
+    tables: list[list[PatchFit]] = [[] for _ in bases]
     for level in range(QUARTERS + 1):
         bad = np.zeros(len(squares.cell), dtype=np.bool_)
         for n, (fit, off) in enumerate(_fitted(probe, names, pieces, bases)):
@@ -177,7 +180,9 @@ def _fits(
     return tables
 
 
-def _fitted(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> list[tuple[Fit, FloatArray]]:
+def _fitted(
+    probe: Probe, names: Array, pieces: Pieces, bases: list[float]
+) -> list[tuple[PatchFit, FloatArray]]:
     """Fits to rays that start inside the pieces, a table for each sheet, and what rays are off."""
     units, owner = np.unique(np.stack([pieces.wave, pieces.cell]), axis=1, return_inverse=True)
     owner = owner.ravel()
@@ -186,7 +191,7 @@ def _fitted(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> l
     paths, rows, found, _ = probe.paths(starts)
     wanted = np.repeat(names[units[0]], at.shape[1])
     rows = rows[found == wanted[paths.ray[rows]]]
-    paths = replace(paths, amplitude=paths.amplitude * profile(probe.beam, starts)[paths.ray])
+    amplitude = (components(paths, probe.ccd) * profile(probe.beam, starts)[paths.ray]).T
     wave = units[0][paths.ray[rows] // at.shape[1]]
     fits = []
     for n, base in enumerate(bases):
@@ -194,14 +199,16 @@ def _fitted(probe: Probe, names: Array, pieces: Pieces, bases: list[float]) -> l
         part, arrived = pieces.wave == n, rows[wave == n]
         coefficients, turns, good, off = fitted(
             at[mine], low[mine], high[mine], paths.ray[arrived] - mine.start * at.shape[1],
-            arrivals(paths, arrived, probe.ccd), paths.amplitude[arrived], base, probe.ccd.shape,
+            arrivals(paths, arrived, probe.ccd), amplitude[arrived], base, probe.ccd.shape,
         )  # fmt: skip
-        fit = Fit(pieces.part(part), owner[part] - mine.start, coefficients, turns, low[mine], high[mine])
+        fit = PatchFit(
+            pieces.part(part), owner[part] - mine.start, coefficients, turns, low[mine], high[mine]
+        )
         fits.append((fit.where(good), off[good]))
     return fits
 
 
-def _together(parts: list[Fit], base: float, ccd: CCD) -> Cells:
+def _together(parts: list[PatchFit], base: float, ccd: CCD) -> PatchCells:
     """One sheet's cells and leaves, of several tables of fits."""
     before = np.cumsum([0] + [len(part.coefficients) for part in parts])
     owner = [part.owner + offset for part, offset in zip(parts, before[:-1], strict=True)]
@@ -217,7 +224,7 @@ def _together(parts: list[Fit], base: float, ccd: CCD) -> Cells:
     )
 
 
-def _drawn(fit: Fit, probe: Probe) -> FloatArray:
+def _drawn(fit: PatchFit, probe: Probe) -> FloatArray:
     """Segments (n, 4) in pixels: chords of pieces, and what of the beam's rim they touch."""
     pieces = fit.pieces
     ends, owner = [pieces.chord[pieces.cut]], [fit.owner[pieces.cut]]

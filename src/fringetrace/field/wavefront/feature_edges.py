@@ -1,4 +1,4 @@
-"""Edges of a scene's meshes, and from where on the beam light comes by them."""
+"""Feature edges of meshes (rims, creases, silhouettes), and where the beam passes them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from fringetrace.core import Array, FloatArray, unit
 from fringetrace.field.wavefront.ray_tubes import along_grid
 from fringetrace.geometry import weld
-from fringetrace.scene import Scene, Surface, parted
+from fringetrace.scene import Scene, Surface, group_facets
 from fringetrace.tracing import Fate, Paths
 
 # Rays go by an edge this many cells to either side of it and within its ends, so far apart along it.
@@ -35,7 +35,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Creases:
-    """Edges of meshes where light may part.
+    """Edges of meshes where light may be split.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Creases:
     normals: FloatArray
 
     def seen_along(self, direction: FloatArray) -> FloatArray:
-        """Ends (m, 2, 3) of those that part light of a direction (3,)."""
+        """End points (m, 2, 3) of the edges that split light of a direction (3,)."""
         facing = self.normals @ direction
         with np.errstate(invalid="ignore"):
             through = facing[:, 0] * facing[:, 1] > 0.0
@@ -57,7 +57,7 @@ class Creases:
 
 
 def creases(scene: Scene) -> Creases:
-    """Rims, edges between facets of different planes, and all edges within forms.
+    """Feature edges: rims, edges between facets of different planes, and all edges within forms.
 
     Parameters
     ----------
@@ -68,7 +68,9 @@ def creases(scene: Scene) -> Creases:
     Creases
     """
     if "creases" not in scene.derived:
-        found = [_of(surface, part) for surface, part in zip(scene.surfaces, parted(scene), strict=True)]
+        found = [
+            _of(surface, part) for surface, part in zip(scene.surfaces, group_facets(scene), strict=True)
+        ]
         columns = ([getattr(one, field.name) for one in found] for field in fields(Creases))
         scene.derived["creases"] = Creases(*(np.concatenate(column) for column in columns))
     kept: Creases = scene.derived["creases"]
@@ -94,7 +96,7 @@ def _of(surface: Surface, part: npt.NDArray[np.int64]) -> Creases:
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """Legs of node rays that met the same surfaces so far: straight lines on the beam's grid.
+    """Segments of node rays that met the same surfaces so far: straight lines over the beam's grid.
 
     Attributes
     ----------
@@ -121,7 +123,7 @@ class Leg:
     steps: FloatArray
 
     def nearest(self, points: FloatArray) -> tuple[FloatArray, Mask, Mask]:
-        """Where on the beam's grid the light starts that comes by points, by linear steps between nodes.
+        """Point of the beam's grid whose light passes given points, interpolated between nodes.
 
         Parameters
         ----------
@@ -169,8 +171,8 @@ def _solved(slope: FloatArray, miss: FloatArray) -> FloatArray:
     return np.where((bend > LOST * a * c)[:, None], step, 0.0)
 
 
-def legs(paths: Paths, shape: tuple[int, int]) -> Iterator[tuple[Leg, FloatArray]]:
-    """Legs of rays from the nodes of a beam's grid, and the edges of meshes that are near them.
+def segments_near_edges(paths: Paths, shape: tuple[int, int]) -> Iterator[tuple[Leg, FloatArray]]:
+    """Segments of the rays from a beam's grid nodes, with the mesh edges near them.
 
     Parameters
     ----------
@@ -203,7 +205,7 @@ def _lines(paths: Paths) -> Iterator[tuple[FloatArray, Array]]:
     assert paths.triangle is not None
     assert paths.points is not None
     assert paths.starts is not None
-    parts = parted(paths.scene)
+    parts = group_facets(paths.scene)
     offset = np.cumsum([0] + [len(part) for part in parts])
     part = np.concatenate(parts)[(paths.triangle + offset[paths.surface]).clip(0)]
     part -= part.min(initial=0)
@@ -264,8 +266,8 @@ def _leg(lines: FloatArray, ray: Array, wide: int, every: Array) -> Leg | None:
     return Leg(corner, stride, number, nodes, start, direction, reach, steps[known])
 
 
-def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, Mask]:
-    """Places on a beam's grid from which light comes by the edges of meshes, on either side of them.
+def places_beside_edges(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray, Mask]:
+    """Points on the beam's grid from which light passes mesh edges, on either side.
 
     Found from the legs of the rays from the nodes: exactly where these are parallel, else to second
     order in the spacing of the nodes.
@@ -287,7 +289,7 @@ def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray,
         Whether the next one is on the same side of the same edge.
     """
     places, goes_on = [np.empty((0, 2))], [np.empty(0, dtype=np.bool_)]
-    for leg, edges in legs(paths, shape):
+    for leg, edges in segments_near_edges(paths, shape):
         at, on = _along(leg, edges, np.array(shape[::-1]) - 1.0)
         places.append(at)
         goes_on.append(on)
@@ -299,7 +301,7 @@ def beside(paths: Paths, shape: tuple[int, int], most: int) -> tuple[FloatArray,
 
 
 def _along(leg: Leg, ends: FloatArray, size: FloatArray) -> tuple[FloatArray, Mask]:
-    """Places on a grid of a size beside edges (n, 2, 3) of meshes that a leg comes by, as `beside`."""
+    """Places on a grid of a size beside edges (n, 2, 3) that a leg comes by, as `places_beside_edges`."""
     at, there, _ = leg.nearest(ends.reshape(-1, 3))
     at, there = at.reshape(-1, 2, 2), there.reshape(-1, 2)
     begin, end = _clipped(at, size)

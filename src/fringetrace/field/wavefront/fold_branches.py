@@ -1,4 +1,4 @@
-"""Seeds of folds on a sheet, and from them the two branches beside a fold at each sample point; compiled.
+"""Compiled search for folds of a wavefront, and for the two branches at samples beside a fold.
 
 See `folds` for the field that they make, `raster` for cells and samples.
 """
@@ -49,7 +49,7 @@ SAMPLE, Z, WAY, RE_A, IM_A, RE_B, IM_B, TURNS, FOOT_P, FOOT_Q, P1, Q1, P2, Q2, N
 
 @jit
 def seeds(cells, index, turns, place, crossed, wavenumber):
-    """Points of the folds in some cells."""
+    """Points on the folds of cells."""
     found = np.empty((SQUARES * SQUARES * len(crossed), 11))
     count = 0
     for cell in crossed:
@@ -87,7 +87,7 @@ def seeds(cells, index, turns, place, crossed, wavenumber):
 
 @jit
 def window(seed, depth, height, slack, top, rows, columns):
-    """Pixels that may lie in the strip across a fold at a seed: rows and columns, from and to."""
+    """Pixel range (rows and columns, from and to) that may lie in the strip across a fold at a seed."""
     left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
     reach = seed[REACH] + slack
     for side in (-reach, reach):
@@ -103,7 +103,7 @@ def window(seed, depth, height, slack, top, rows, columns):
 
 @jit
 def widen_beside(seeds, wavenumber, top, columns, first, x, y, slope):
-    """Widen the gradients in pixels beside folds, which may cross them anywhere, by the first fringe's."""
+    """Widen the phase gradients of pixels beside folds by those of the first Airy fringe."""
     rows = (len(first) - 1) // columns
     for seed in seeds:
         fringe = np.sqrt(FIRST) / (wavenumber * seed[WIDTH])
@@ -123,8 +123,8 @@ def widen_beside(seeds, wavenumber, top, columns, first, x, y, slope):
 
 
 @jit
-def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x, y, latest):
-    """Two branches at each sample beside a fold, in the dark too: rows; `latest` of each sample."""
+def branches_beside_folds(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x, y, latest):
+    """Two branches at each sample beside a fold, on its dark side too: rows; `latest` of each sample."""
     found = np.empty((1024, 18))
     count = 0
     rows = (len(first) - 1) // columns
@@ -158,7 +158,7 @@ def beside(seeds, cells, index, lines, turns, wavenumber, top, columns, first, x
 
 @jit
 def known(found, row, p, q, reach):
-    """Whether one of the rows of a sample has its foot on a fold within reach of (p, q)."""
+    """Whether one of a sample's rows has its foot on a fold within reach of (p, q)."""
     while row >= 0:
         if abs(found[row, FOOT_P] - p) + abs(found[row, FOOT_Q] - q) < reach:
             return True
@@ -168,7 +168,7 @@ def known(found, row, p, q, reach):
 
 @jit
 def branches(seed, cells, index, lines, turns, wavenumber, p, q, x, y, row):
-    """Fill in the two branches at a sample whose foot on the fold is (p, q); whether there are any."""
+    """Fill in the two branches at a sample whose foot on the fold is (p, q); whether they exist."""
     if not within(index, lines, p, q):
         return False
     at_x, at_y, normal_x, normal_y, across_p, across_q, bend, _ = frame(cells, index, p, q)
@@ -203,7 +203,7 @@ def branches(seed, cells, index, lines, turns, wavenumber, p, q, x, y, row):
 
 @jit
 def resolve(found, latest):
-    """A branch between two folds (near a cusp) is the nearer one's, and corrected for the other."""
+    """Assign a branch between two folds (near a cusp) to the nearer one, corrected for the other."""
     for k in range(len(latest)):
         row = latest[k]
         while row >= 0:
@@ -227,14 +227,14 @@ def owns(row, p, q):
 
 @jit
 def within(index, lines, p, q):
-    """Whether the sheet is there at a place of the grid."""
+    """Whether the wavefront exists at a point of the grid."""
     cell, s, t = locate(index, p, q)
     return cell >= 0 and lines[cell, 0] * s + lines[cell, 1] * t >= lines[cell, 2]
 
 
 @jit
 def taken(found, row, p, q):
-    """Whether a root is one of two that a row of its sample has."""
+    """Whether a root belongs to a row of its sample."""
     while row >= 0:
         if found[row, OWNS] == 1.0 and owns(found[row], p, q):
             return True

@@ -1,4 +1,4 @@
-"""Folds on the grid of a beam: their feet, the two branches beside them, and these continued; compiled.
+"""Compiled geometry of folds (caustics) on the beam's grid: foot points, branches, continuation.
 
 The map from the grid (p along its columns, q along its rows) to the CCD is that of the cells of a
 sheet, see `raster`; `index` has the cell on each square of the grid, -1 where there is none.
@@ -20,7 +20,7 @@ EVEN = 1.2
 
 @part
 def curved(cells, cell, f, s, t):
-    """Value of field f of a cell, its derivatives along s and t, and along ss, st, tt."""
+    """Value of field f of a cell, with first and second derivatives along s and t."""
     value, along_s, along_ss, along_t, along_st, along_tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3, -1, -1):
         c0, c1 = cells[cell, f, i, 0], cells[cell, f, i, 1]
@@ -36,7 +36,7 @@ def curved(cells, cell, f, s, t):
 
 @jit
 def locate(index, p, q):
-    """Cell at a place of the grid, -1 if there is none, and s, t in it; half a cell beyond the rim."""
+    """Cell at a point of the grid, -1 if there is none, and s, t in it; half a cell beyond the rim."""
     rows, columns = index.shape
     if not (-0.5 <= p <= columns + 0.5 and -0.5 <= q <= rows + 0.5):
         return -1, 0.0, 0.0
@@ -47,7 +47,7 @@ def locate(index, p, q):
 
 @jit
 def follow(cells, index, p, q, dp, dq, sign, x, y):
-    """Root of the map at (x, y) with J of one sign, by Newton from a step off a fold: found, p, q."""
+    """Newton root of the map at (x, y) with J of one sign, from a step off a fold: found, p, q."""
     last = False
     for _ in range(40):
         cell, s, t = locate(index, p + dp, q + dq)
@@ -73,7 +73,7 @@ def follow(cells, index, p, q, dp, dq, sign, x, y):
 
 @jit
 def foot(cells, index, p, q, x, y):
-    """Point of a fold from which (x, y) lies straight across, by Newton from (p, q): found, p, q."""
+    """Foot point of (x, y) on a fold, by Newton from (p, q): found, p, q."""
     step = np.inf
     for _ in range(20):
         cell, s, t = locate(index, p, q)
@@ -107,7 +107,7 @@ def foot(cells, index, p, q, x, y):
 
 @jit
 def frame(cells, index, p, q):
-    """A fold: x, y; normal to its lit side; direction across on the grid in which J grows; bend; stretch.
+    """Local frame of a fold: x, y; normal to its lit side; grid direction of growing J; bend; stretch.
 
     Half of `bend` times the square of a step across on the grid is the distance from the fold in pixels;
     `stretch` is how many pixels a step along the fold takes.
@@ -136,7 +136,7 @@ def frame(cells, index, p, q):
 
 @jit
 def wave(cells, index, p, q):
-    """A branch at a root: path, both gradients of it, J, amplitude, cell."""
+    """Wave of a branch at a root: path, both gradients of it, J, amplitude, cell."""
     cell, s, t = locate(index, p, q)
     way, ws, wt = patch(cells, cell, 2, s, t)
     _, xs, xt = patch(cells, cell, 0, s, t)
@@ -148,7 +148,7 @@ def wave(cells, index, p, q):
 
 @jit
 def pair(cells, index, turns, wavenumber, p, q, across_p, across_q, bend, height, x, y):
-    """Branches that a fold at (p, q) parts, at (x, y), `height` beyond: found, roots, z, W, A, B, turns."""
+    """Two branches of a fold at (p, q), at (x, y), `height` beyond: found, roots, z, W, A, B, turns."""
     half = np.sqrt(2.0 * height / bend)
     up, p1, q1 = follow(cells, index, p, q, half * across_p, half * across_q, 1.0, x, y)
     down, p2, q2 = follow(cells, index, p, q, -half * across_p, -half * across_q, -1.0, x, y)
@@ -167,7 +167,7 @@ def pair(cells, index, turns, wavenumber, p, q, across_p, across_q, bend, height
 
 @jit
 def continued(cells, index, turns, wavenumber, p, q, width, height):
-    """`pair` at any height, as the polynomial through `NODES` widths: found, even, z, W, A, B, turns."""
+    """Branches `pair` at any height, by the polynomial through `NODES` widths."""
     x, y, normal_x, normal_y, across_p, across_q, bend, _ = frame(cells, index, p, q)
     rate, way, a, b, passed = 0.0, 0.0, 0.0j, 0.0j, 0
     least, most = np.inf, 0.0
@@ -191,7 +191,7 @@ def continued(cells, index, turns, wavenumber, p, q, width, height):
 
 @jit
 def airy_width(cells, index, turns, wavenumber, p, q):
-    """Distance from a fold over which z grows by 1, in pixels; 0 if the fold has no lit side so wide."""
+    """Airy width of a fold in pixels: distance over which z grows by 1; 0 without a lit side so wide."""
     x, y, normal_x, normal_y, across_p, across_q, bend, _ = frame(cells, index, p, q)
     height, aim = 0.125 * bend, 1.0
     for _ in range(20):
@@ -210,7 +210,7 @@ def airy_width(cells, index, turns, wavenumber, p, q):
 
 @jit
 def onto(cells, index, p, q, reach):
-    """Point of a fold near a place of the grid, J = 0, not farther than `reach` along p or q: found, p, q."""
+    """Fold point (J = 0) nearest to a point of the grid, within `reach` along p or q: found, p, q."""
     start_p, start_q = p, q
     for _ in range(12):
         cell, s, t = locate(index, p, q)

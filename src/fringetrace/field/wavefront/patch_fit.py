@@ -1,4 +1,4 @@
-"""Patches of a curved sheet fitted to rays: from places in the lit parts of cells to coefficients."""
+"""Least-squares fit of wavefront patches to rays in the lit parts of cells."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """Patches of a sheet and the pieces of cells that they are meant for.
+class PatchFit:
+    """Fitted patches of a wavefront, and the pieces of cells that they cover.
 
     Attributes
     ----------
     pieces : Pieces
     owner : (n,) int64
         The patch of each piece.
-    coefficients : (m, 6, 4, 4) float64
+    coefficients : (m, 4 + 2 components, 4, 4) float64
         See `raster`; s and t run from 0 to 1 over the patch.
     turns : (m, 2) int64
         Caustics passed where J < 0 and where J > 0.
@@ -58,47 +58,47 @@ class Fit:
     high: FloatArray
 
     def local(self, at: FloatArray, owner: Array) -> FloatArray:
-        """Points (n, ..., 2) of the beam's grid on their patches."""
+        """Patch coordinates of points (n, ..., 2) of the beam's grid."""
         spread = (len(at), *[1] * (at.ndim - 2), 2)
         low, high = (corner[owner].reshape(spread) for corner in (self.low, self.high))
         return np.asarray((at - low) / (high - low), dtype=np.float64)
 
     @property
     def domain(self) -> FloatArray:
-        """(n, 4) s from and to, t from and to, of each piece."""
+        """Domain of each piece, (n, 4): s from and to, t from and to."""
         box = self.local(np.stack([self.pieces.low, self.pieces.high], axis=1), self.owner)
         return np.clip(np.swapaxes(box, 1, 2).reshape(-1, 4), 0.0, 1.0)
 
     @property
     def lines(self) -> FloatArray:
-        """(n, 3) a, b, c on the patch: lit where a s + b t >= c."""
+        """Chord of each patch, (n, 3) a, b, c: lit where a s + b t >= c."""
         here = self.pieces
         return Pieces(here.wave, here.cell, here.low, here.high, self.local(here.chord, self.owner)).lines
 
     @property
     def place(self) -> npt.NDArray[np.int64]:
-        """(m, 2) row and column of patches that are cells of the grid, all of them lit; else -1."""
+        """Row and column (m, 2) of patches that are fully lit cells of the grid; else -1."""
         whole = (self.high - self.low == 1.0).all(axis=1) & (self.low == np.floor(self.low)).all(axis=1)
         whole[self.owner[~self.pieces.whole]] = False
         return np.where(whole[:, None], self.low[:, ::-1], -1.0).astype(np.int64)
 
-    def where(self, good: npt.NDArray[np.bool_]) -> Fit:
-        """Some of the patches."""
+    def where(self, good: npt.NDArray[np.bool_]) -> PatchFit:
+        """Subset of the patches."""
         kept = good[self.owner]
         number = np.cumsum(good) - 1
-        return Fit(
+        return PatchFit(
             self.pieces.part(kept), number[self.owner[kept]], self.coefficients[good], self.turns[good],
             self.low[good], self.high[good],
         )  # fmt: skip
 
     def pixels(self, at: FloatArray, owner: Array) -> FloatArray:
-        """Points (n, 2) of the beam's grid on the CCD, by patches `owner` (n,)."""
+        """CCD coordinates of points (n, 2) of the beam's grid, by patches `owner` (n,)."""
         s, t = (np.stack([u**i for i in range(4)], axis=-1) for u in self.local(at, owner).T)
         lines = np.einsum("nfij,nj->nfi", self.coefficients[owner, :2], t)
         return np.asarray(np.einsum("nfi,ni->nf", lines, s), dtype=np.float64)
 
     def drawn(self, ends: FloatArray, owner: Array, most: int) -> FloatArray:
-        """Segments (m, 4) on the CCD of lines (n, 2, 2) on the beam's grid, a pixel long, `most` each."""
+        """CCD segments (m, 4) of lines (n, 2, 2) on the beam's grid, a pixel long, at most `most` each."""
         begin, end = np.moveaxis(ends, 1, 0)
         stops = [self.pixels(begin + f * (end - begin), owner) for f in (0.0, 0.5, 1.0)]
         length = sum(np.linalg.norm(b - a, axis=1) for a, b in pairwise(stops))
@@ -149,7 +149,7 @@ def _halton(count: int) -> FloatArray:
 
 
 def places(pieces: Pieces, owner: Array, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Places evenly spread over the lit parts of cells.
+    """Points spread evenly over the lit parts of cells.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def fitted(
     at: FloatArray, low: FloatArray, high: FloatArray, ray: Array, arrived: Arrivals, amplitude: ComplexArray,
     base: float, shape: tuple[int, int],
 ) -> tuple[FloatArray, npt.NDArray[np.int64], npt.NDArray[np.bool_], FloatArray]:  # fmt: skip
-    """Patches of a sheet by least squares.
+    """Wavefront patches fitted by least squares.
 
     Parameters
     ----------
@@ -211,7 +211,7 @@ def fitted(
     ray : (m,) int64
         Which of them arrived, counted through.
     arrived : Arrivals
-    amplitude : (m,) complex128
+    amplitude : (m, components) complex128
     base : float, metres
         Paths are fitted less this.
     shape : (rows, columns)
@@ -219,7 +219,7 @@ def fitted(
 
     Returns
     -------
-    coefficients : (n, 6, 4, 4) float64
+    coefficients : (n, 4 + 2 components, 4, 4) float64
         See `raster`.
     turns : (n, 2) int64
         Caustics passed where J < 0 and where J > 0.
@@ -237,7 +237,8 @@ def fitted(
     row: Array = number.reshape(count, RAYS)
     row = np.where(known, row, row[np.arange(count), np.argmax(known, axis=1)][:, None])
     good &= _near(arrived.x[row], shape[1]) & _near(arrived.y[row], shape[0]) if len(ray) else False
-    coefficients, turns = np.zeros((count, 6, 4, 4)), np.zeros((count, 2), dtype=np.int64)
+    coefficients = np.zeros((count, 4 + 2 * amplitude.shape[1], 4, 4))
+    turns = np.zeros((count, 2), dtype=np.int64)
     off = np.zeros(count)
     chosen = np.flatnonzero(good)
     for some in np.split(chosen, range(CHUNK, len(chosen), CHUNK)):
@@ -274,14 +275,14 @@ def _patches(
     x, y, w = arrived.x[row], arrived.y[row], arrived.length[row] - base
     steps = slopes(np.stack([x, y], axis=-1))
     area = np.linalg.det(steps)
-    light = amplitude[row] * root[:, None]
-    values = np.stack([x, y, w, area, light.real, light.imag], axis=-1) * known[..., None]
+    light = np.ascontiguousarray(amplitude[row] * root[:, None, None]).view(np.float64)
+    values = np.concatenate([np.stack([x, y, w, area], axis=-1), light], axis=-1) * known[..., None]
     cubic = (s[..., :4, None] * t[..., None, :4]).reshape(*s.shape[:2], 16)
     cubic *= known[..., None]
     found = np.linalg.pinv(cubic, rcond=RANK) @ values
     left = (cubic @ found - values)[..., :2]
     off = np.sqrt((left**2).sum(axis=(1, 2)) / known.sum(axis=1))
-    found = np.swapaxes(found, 1, 2).reshape(-1, 6, 4, 4)
+    found = np.swapaxes(found, 1, 2).reshape(len(x), -1, 4, 4)
     turns = np.zeros((len(x), 2), dtype=np.int64)
     if arrived.way is not None:
         passed = caustics(arrived.way[row], arrived.direction[row], arrived.last[row], slopes)

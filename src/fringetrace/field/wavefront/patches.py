@@ -1,18 +1,21 @@
-"""Sheets of arrivals on smooth surfaces: a map from the beam to the CCD, interpolated to fourth order."""
+"""Wavefront patches: bicubic Hermite interpolation of arrivals from the beam's grid to the CCD."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame
+from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.field.wavefront.ray_tubes import along_grid, caustics, differences
-from fringetrace.scene import CCD, Beam
-from fringetrace.tracing import Paths, landed
+from fringetrace.scene import CCD, Beam, pixels
+from fringetrace.tracing import Paths, components, landed
 
+# Of the fields of a cell (x, y, path, J) the amplitudes come last: two for each component.
+AMPLITUDE = 4
 # From values and slopes at both ends to the coefficients of a cubic.
 HERMITE = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [-3, 3, -2, -1], [2, -2, 1, 1]])
 
@@ -30,7 +33,8 @@ class Sheet:
     length : (rows, columns) float64, metres
         Optical path, less `base`.
     base : float, metres
-    amplitude : (rows, columns) complex128
+    amplitude : (rows, columns, components) complex128
+        See `components`.
     turns : (rows, columns) int64
         Caustics passed (the KMAH index).
     """
@@ -46,8 +50,8 @@ class Sheet:
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
-    """A sheet's cells as the kernels read them, see `raster`; for `place` see `leaved`."""
+class PatchCells:
+    """Cells of a wavefront in the form that the kernels read; for `place` see `leaved`."""
 
     coefficients: FloatArray
     leaves: FloatArray
@@ -56,9 +60,31 @@ class Cells:
     base: float
     place: npt.NDArray[np.int64]
 
+    def component(self, number: int) -> FloatArray:
+        """Coefficients (n, 6, 4, 4) with one component of the amplitude."""
+        if self.coefficients.shape[1] == AMPLITUDE + 2:
+            return self.coefficients
+        chosen = [*range(AMPLITUDE), AMPLITUDE + 2 * number, AMPLITUDE + 2 * number + 1]
+        return np.ascontiguousarray(self.coefficients[:, chosen])
+
+    @cached_property
+    def crossed(self) -> npt.NDArray[np.bool_]:
+        """Which squares of the beam's grid (n,) a fold crosses: J changes its sign at their corners."""
+        corner = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]])
+        corners = np.einsum("si,nij,tj->nst", corner, self.coefficients[:, 3], corner)
+        signs = (corners.min(axis=(1, 2)) <= 0.0) & (corners.max(axis=(1, 2)) >= 0.0)
+        return np.asarray(signs & (self.place >= 0).all(axis=1))
+
+    @cached_property
+    def folds(self) -> bool:
+        """Whether there are folds, where the field depends on the wavelength beyond its phase."""
+        from fringetrace.field.wavefront.raster_kernels import SIGN
+
+        return bool(self.crossed.any() or (self.leaves[:, SIGN] == 0.0).any())
+
 
 def sheets(paths: Paths) -> Iterator[Sheet]:
-    """Arrivals of a beam, sorted by path key onto its grid.
+    """Arrivals of a beam on its grid, one table per path key.
 
     Parameters
     ----------
@@ -83,7 +109,7 @@ def sheets(paths: Paths) -> Iterator[Sheet]:
 
 
 def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
-    """Arrivals of one sequence of surfaces, put onto a grid.
+    """Arrivals of one surface sequence on a grid.
 
     Parameters
     ----------
@@ -98,6 +124,7 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
     -------
     Sheet
     """
+    chosen = paths.where(rows)
     arrived = arrivals(paths, rows, ccd)
 
     def grid(values: Array) -> Array:
@@ -113,13 +140,13 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
         turns = caustics(way, direction, last, along_grid)
     return Sheet(
         x=grid(arrived.x), y=grid(arrived.y), slope_x=grid(arrived.slope_x), slope_y=grid(arrived.slope_y),
-        length=grid(arrived.length - base), base=base, amplitude=grid(paths.amplitude[rows]), turns=turns,
+        length=grid(arrived.length - base), base=base, amplitude=grid(components(chosen, ccd).T), turns=turns,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class Arrivals:
-    """Where and how (n,) paths of as many bounces arrive; as in `Sheet`, and for `caustics`.
+    """Arrivals of paths (n,) with equal numbers of bounces; as in `Sheet`, and for `caustics`.
 
     `length` is the whole path, `way` (n, bounces + 2, 3) the points that it went through, None unless
     recorded, `direction` (n, 3) that of its last leg, `last` that leg's length.
@@ -136,7 +163,7 @@ class Arrivals:
 
 
 def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
-    """Where and how paths of as many bounces cross the CCD's plane of focus.
+    """Arrivals of paths with equal numbers of bounces on the CCD's plane of focus.
 
     Parameters
     ----------
@@ -149,18 +176,18 @@ def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
     -------
     Arrivals
     """
-    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
+    u, v, _ = ccd.axes
     chosen = paths.where(rows)
     _, point, length = landed(chosen, ccd)
-    offset, direction = point - ccd.centre, chosen.direction
+    pixel, direction = pixels(ccd, point), chosen.direction
     way, last = None, np.zeros(len(rows))
     if chosen.points is not None:
         bounces = int(chosen.bounces.max(initial=0))
         way = np.concatenate([chosen.points[:, : bounces + 1], point[:, None]], axis=1)
         last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
     return Arrivals(
-        x=offset @ u / ccd.pitch + 0.5 * ccd.shape[1],
-        y=offset @ v / ccd.pitch + 0.5 * ccd.shape[0],
+        x=pixel[:, 1],
+        y=pixel[:, 0],
         slope_x=chosen.gradient @ u * ccd.pitch,
         slope_y=chosen.gradient @ v * ccd.pitch,
         length=length,
@@ -171,7 +198,7 @@ def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
 
 
 def checked(paths: Paths) -> tuple[CCD, Beam]:
-    """The CCD and the beam of paths, once they are known to have both.
+    """CCD and beam of paths; ValueError unless they have both.
 
     Parameters
     ----------
@@ -216,7 +243,7 @@ def _interpolated(f: FloatArray) -> FloatArray:
 
 
 def patches(sheet: Sheet) -> tuple[FloatArray, FloatArray]:
-    """Hermite patches between the nodes of a sheet.
+    """Bicubic Hermite patches between the nodes of a grid.
 
     The optical path has the exact gradient, dW = p . dx; positions have tangents by differences
     of fourth order.
@@ -227,7 +254,7 @@ def patches(sheet: Sheet) -> tuple[FloatArray, FloatArray]:
 
     Returns
     -------
-    coefficients : (rows - 1, columns - 1, 6, 4, 4) float64
+    coefficients : (rows - 1, columns - 1, 4 + 2 components, 4, 4) float64
         See `raster`; NaN where a corner is missing.
     area : (rows, columns) float64
         The map's Jacobian at the nodes.
@@ -242,9 +269,9 @@ def patches(sheet: Sheet) -> tuple[FloatArray, FloatArray]:
         _bicubic(sheet.y, y_s, y_t, differences(y_s, 0)),
         _bicubic(sheet.length, w_s, w_t, 0.5 * (differences(w_s, 0) + differences(w_t, 1))),
         _interpolated(area),
-        _interpolated(sheet.amplitude.real),
-        _interpolated(sheet.amplitude.imag),
     ]
+    for component in np.moveaxis(sheet.amplitude, -1, 0):
+        fields += [_interpolated(component.real), _interpolated(component.imag)]
     return np.stack(fields, axis=2), area
 
 
@@ -257,12 +284,12 @@ def leaved(
     domain: FloatArray,
     lines: FloatArray,
     ccd: CCD,
-) -> Cells:
-    """Cells and their leaves.
+) -> PatchCells:
+    """Patch cells with their quadtree leaves.
 
     Parameters
     ----------
-    coefficients : (n, 6, 4, 4) float64
+    coefficients : (n, 4 + 2 components, 4, 4) float64
     turns : (n, 2) int64
     base : float, metres
     place : (n, 2) int64
@@ -277,11 +304,11 @@ def leaved(
 
     Returns
     -------
-    Cells
+    PatchCells
     """
     from fringetrace.field.wavefront import raster_kernels
 
-    leaves = raster_kernels.split(np.ascontiguousarray(coefficients[owner]), domain, lines, *ccd.shape)
+    leaves = raster_kernels.split_cells(np.ascontiguousarray(coefficients[owner]), domain, lines, *ccd.shape)
     leaves[:, raster_kernels.CELL] = owner[leaves[:, raster_kernels.CELL].astype(np.int64)]
     folded = np.zeros(len(coefficients), dtype=np.bool_)
     signs = np.zeros((len(coefficients), 2), dtype=np.bool_)
@@ -291,11 +318,11 @@ def leaved(
         ] = True
     folded[leaves[leaves[:, raster_kernels.SIGN] == 0.0, raster_kernels.CELL].astype(np.int64)] = True
     folded |= signs.all(axis=1)
-    return Cells(np.ascontiguousarray(coefficients), leaves, folded, turns, base, place)
+    return PatchCells(np.ascontiguousarray(coefficients), leaves, folded, turns, base, place)
 
 
-def cells(sheet: Sheet, ccd: CCD) -> Cells:
-    """Hermite patches between the nodes of a sheet, and their leaves.
+def cells(sheet: Sheet, ccd: CCD) -> PatchCells:
+    """Bicubic Hermite patches between the nodes of a grid, with their quadtree leaves.
 
     At the rim of the beam's grid a cell reaches on to the rim of the beam, half a cell beyond the rays.
 
@@ -306,7 +333,7 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
 
     Returns
     -------
-    Cells
+    PatchCells
     """
     coefficients, area = patches(sheet)
     whole = np.isfinite(coefficients).all(axis=(2, 3, 4))
@@ -325,14 +352,14 @@ def cells(sheet: Sheet, ccd: CCD) -> Cells:
 
 
 def largest(grid: Array, size: int) -> Array:
-    """Largest of each size x size window of a grid."""
+    """Maximum of each size x size window of a grid."""
     rows, columns = (n - size + 1 for n in grid.shape)
     window = range(size)
     return np.asarray(np.max([grid[i : i + rows, j : j + columns] for i in window for j in window], axis=0))
 
 
 def branch_turns(turns: npt.NDArray[np.int64], area: FloatArray) -> npt.NDArray[np.int64]:
-    """Caustics passed in each cell where J < 0 and where J > 0: that of its corners of that sign.
+    """Caustics passed in each cell where J < 0 and where J > 0, from its corners of that sign.
 
     A fold that reaches into a cell, but to none of its corners, has them in the next cell.
     """

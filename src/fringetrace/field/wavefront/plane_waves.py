@@ -1,4 +1,4 @@
-"""Sheets off flat facets: a plane wave for each sequence of facets, and its region of the beam."""
+"""Plane waves off sequences of flat facets, and their regions of the beam."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame, unit
-from fringetrace.field.pixel_quadrature import Samples
+from fringetrace.core import Array, ComplexArray, FloatArray, unit
+from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront.boundary_search import cut
 from fringetrace.field.wavefront.probe import RIM, profile
 from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
-from fringetrace.optics import refracted
-from fringetrace.scene import CCD, Beam, Surface
-from fringetrace.tracing import Paths, Segments, landed
+from fringetrace.optics import IncidentRays, refract
+from fringetrace.scene import CCD, Beam, Surface, pixels
+from fringetrace.tracing import Paths, Segments, components, landed
 
 
 @dataclass(frozen=True, eq=False)
 class Wave:
-    """A plane wave off a sequence of facets.
+    """Plane wave off a sequence of facets.
 
     Attributes
     ----------
@@ -35,7 +35,8 @@ class Wave:
     path : float, metres
         Its optical path.
     gradient : (2,) float64, metres a pixel
-    amplitude : complex
+    amplitude : (components,) complex128
+        See `components`.
     """
 
     name: np.uint64
@@ -44,16 +45,16 @@ class Wave:
     start: FloatArray
     path: float
     gradient: FloatArray
-    amplitude: complex
+    amplitude: ComplexArray
 
     def to_pixels(self, at: FloatArray) -> FloatArray:
-        """Points (..., 2) of the beam's grid on the CCD."""
+        """CCD coordinates of points (..., 2) of the beam's grid."""
         return np.asarray(self.origin + (at - self.start) @ self.matrix.T, dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Where on the beam's grid a wave starts: cells from `low` on, and pieces of cells, see `raster`.
+    """Region of the beam's grid where a wave starts: cells from `low` on, and pieces of cells.
 
     `segments` are the region's edges on the beam's grid, (n, 2, 2).
     """
@@ -78,30 +79,49 @@ def _met(paths: Paths, row: int) -> list[tuple[Surface, FloatArray]]:
     return list(zip(surfaces, normals, strict=True))
 
 
+def _sent(paths: Paths, row: int, bounce: int, direction: FloatArray, normal: FloatArray) -> FloatArray:
+    """Direction (3,) in which a thin element sends light, where the next surface is at the same place."""
+    assert paths.surface is not None
+    assert paths.branch is not None
+    assert paths.points is not None
+    element = paths.scene.surfaces[paths.surface[row, bounce]].element
+    assert element is not None
+    across = unit(np.cross(direction, np.eye(3)[[np.argmin(np.abs(direction))]]))
+    rays = IncidentRays(
+        point=paths.points[row, [bounce + 1]], direction=direction[None], normal=normal[None],
+        index=Segments.of(paths.where(np.array([row]))).index[0, [bounce]],
+        field=(np.ones(1) if paths.field is None else across).astype(np.complex128),
+        wavelength=paths.wavelength,
+    )  # fmt: skip
+    sent = element.act(rays)[paths.branch[row, bounce] - 1].direction
+    return direction if sent is None else np.asarray(sent[0], dtype=np.float64)
+
+
 def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
     """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
     assert paths.starts is not None
     assert paths.branch is not None
-    u, v, direction = frame(beam.direction, beam.up, "Beam")
+    u, v, direction = beam.axes
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
-    count = paths.bounces[row]
-    legs = paths.points[row, 2 : count + 1] - paths.starts[row, 1:count]
-    onward = np.concatenate([legs, paths.direction[row, None]])
+    count, met = paths.bounces[row], _met(paths, row)
     index = Segments.of(paths.where(np.array([row]))).index[0]
-    for k, (surface, normal) in enumerate(_met(paths, row)):
+    onward = paths.points[row, 2 : count + 2] - paths.starts[row, 1 : count + 1]
+    onward[count - 1 :] = paths.direction[row]
+    for k, (surface, normal) in enumerate(met):
         if paths.branch[row, k] == 0:
             across = across - 2.0 * np.outer(normal, normal @ across)
             direction = direction - 2.0 * (direction @ normal) * normal
             continue
-        bent = refracted(direction, normal, index[k], index[k + 1])
+        bent = refract(direction, normal, index[k], index[k + 1])
         if surface.element is not None:
-            bent = onward[k] / np.linalg.norm(onward[k])
+            way = np.linalg.norm(onward[k])
+            bent = onward[k] / way if way > 0.0 else _sent(paths, row, k, direction, normal)
         if bent is not direction:
             # the step along the surface is the same on both sides
             across = across - np.outer(direction, (normal @ across) / (normal @ direction))
             direction = bent
-    right, up, facing = frame(ccd.normal, ccd.up, "CCD")
+    right, up, facing = ccd.axes
     # along the rays into the plane of focus
     across = across - np.outer(direction, (facing @ across) / (facing @ direction))
     _, point, length = landed(paths.where(np.array([row])), ccd)
@@ -111,12 +131,12 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     size = np.sqrt(beam.area / ccd.pitch**2 / spread) if spread > 0.0 else 0.0
     return Wave(
         name=name,
-        origin=axes @ (point[0] - ccd.centre) + 0.5 * np.array(ccd.shape[::-1]),
+        origin=pixels(ccd, point)[0, ::-1],
         matrix=matrix,
         start=start,
         path=float(length[0]),
         gradient=index[count] * np.array([direction @ right, direction @ up]) * ccd.pitch,
-        amplitude=complex(paths.amplitude[row]) * size,
+        amplitude=components(paths.where(np.array([row])), ccd)[:, 0] * size,
     )
 
 
@@ -129,8 +149,8 @@ def _near(wave: Wave, row: Array, column: Array, ccd: CCD) -> npt.NDArray[np.boo
     return np.asarray(across & (y.max(axis=1) > 0) & (y.min(axis=1) < rows))
 
 
-def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
-    """Plane waves on a CCD off the facets of a scene, and the regions of the beam they come from.
+def plane_waves_of(survey: Survey) -> Iterator[tuple[Wave, Region]]:
+    """Plane waves on a CCD off the facets of a scene, and their regions of the beam.
 
     Parameters
     ----------
@@ -150,7 +170,7 @@ def waves(survey: Survey) -> Iterator[tuple[Wave, Region]]:
         row = int(survey.first[index])
         start = np.clip(survey.at[survey.paths.ray[row]], RIM, np.array(beam.shape[::-1]) - RIM)
         wave = _wave(survey.paths, row, survey.names[index], start, beam, ccd)
-        if wave.amplitude != 0:
+        if wave.amplitude.any():
             squares.append(_squares(survey, index, wave, len(found)))
             found.append(wave)
             which.append(index)
@@ -201,11 +221,12 @@ def _region(pieces: Pieces, beam: Beam) -> Region:
 
 
 def _light(beam: Beam, wave: Wave, points: Samples) -> ComplexArray:
-    """Amplitudes of a wave at sample points, with the beam's profile where their light starts."""
+    """Amplitudes (points or 1, components) of a wave, with the beam's profile where its light starts."""
     if beam.profile is None:
-        return np.array([wave.amplitude])
+        return wave.amplitude[None]
     at = np.stack([points.x, points.y], axis=1) - wave.origin
-    return np.asarray(wave.amplitude * profile(beam, at @ np.linalg.inv(wave.matrix).T + wave.start))
+    light = profile(beam, at @ np.linalg.inv(wave.matrix).T + wave.start)
+    return np.asarray(wave.amplitude * light[:, None])
 
 
 def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64]:
@@ -219,33 +240,35 @@ def _window(wave: Wave, region: Region, points: Samples) -> npt.NDArray[np.int64
     return np.asarray(np.clip(window, 0, limits), dtype=np.int64)
 
 
-def spread(
-    wave: Wave, region: Region, beam: Beam, period: float, points: Samples, field: ComplexArray,
-    slope: FloatArray,
-) -> None:  # fmt: skip
-    """Add a plane wave to sample points; exact but for rounding.
+def find_contributions(
+    wave: Wave, region: Region, beam: Beam, points: Samples, slope: FloatArray
+) -> FloatArray:
+    """Contributions of a plane wave at sample points, exact but for rounding.
 
     Parameters
     ----------
     wave : Wave
     region : Region
     beam : Beam
-    period : float, metres
-        The wavelength.
     points : Samples
-    field : (points,) complex128
-        Added to.
     slope : (points, 4) float64, metres a pixel, or (0, 4)
-        Widened, see `raster.spread`.
+        Widened, see `raster_kernels.leaf_contributions`.
+
+    Returns
+    -------
+    (n, 2 + 2 components) float64
+        See `Contributions`.
     """
     from fringetrace.field.wavefront import raster_kernels
 
     window = _window(wave, region, points)
-    if window[0] < window[1] and window[2] < window[3]:
-        back = wave.matrix @ wave.start  # to the corner of the beam's grid
-        raster_kernels.spread_flat(
-            np.linalg.inv(wave.matrix), wave.origin - back, wave.path - wave.gradient @ back,
-            wave.gradient, _light(beam, wave, points), region.kind, *region.low, region.begin,
-            region.pieces, period, points.first, points.x, points.y, points.where_x, points.where_y,
-            points.columns, field, slope, window,
-        )  # fmt: skip
+    if not (window[0] < window[1] and window[2] < window[3]):
+        return np.empty((0, 2 + 2 * len(wave.amplitude)))
+    back = wave.matrix @ wave.start  # to the corner of the beam's grid
+    found: FloatArray = raster_kernels.plane_wave_contributions(
+        np.linalg.inv(wave.matrix), wave.origin - back, wave.path - wave.gradient @ back,
+        wave.gradient, _light(beam, wave, points), region.kind, *region.low, region.begin,
+        region.pieces, points.first, points.x, points.y, points.where_x, points.where_y,
+        points.columns, slope, window,
+    )  # fmt: skip
+    return found

@@ -1,15 +1,15 @@
-"""Which way light takes from any point of a beam: rays traced anew, named after what they meet."""
+"""Ray queries: which surface sequence light takes from any point of a beam, by new rays."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
-from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.tracing import Paths, along, landed, launch_at, trace
+from fringetrace.scene import CCD, Beam
+from fringetrace.tracing import Paths, landed, launch_at, retrace
 
 # Rays at the rim of the beam start this part of a cell inside it.
 RIM = 1e-9
@@ -19,29 +19,24 @@ FUZZ = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class Probe:
-    """A way to ask which sequences of surfaces the light takes from a point of the beam.
+    """Ray query for the surface sequences that light takes from points of the beam.
 
-    `parts` are those of `parted`; `keys` the sequences that are looked at, of up to so many `bounces`;
-    light fainter than `faintest` is not followed.
-    Without `half_wave_loss` a reflection off a mirror changes no sign. Media are those at the `wavelength`;
-    of light with a polarisation the amplitude is the field along an `axis` (3,).
+    `traced` are the paths whose scene is asked; `parts` are those of `group_facets`; `keys` the sequences
+    that are looked at, of up to so many `bounces`; light fainter than `faintest` is not followed.
     """
 
-    scene: Scene
+    traced: Paths
     beam: Beam
     ccd: CCD
     parts: list[npt.NDArray[np.int64]]
     keys: npt.NDArray[np.uint64]
     bounces: int
     faintest: float
-    half_wave_loss: bool
-    wavelength: float | None = None
-    axis: FloatArray | None = None
 
     @property
     def fuzz(self) -> FloatArray:
-        """How well edges are known, in cells of the beam's grid: along columns, along rows."""
-        bounds = np.stack([surface.mesh.bounds for surface in self.scene.surfaces])
+        """Uncertainty of edges in cells of the beam's grid: along columns, along rows."""
+        bounds = np.stack([surface.mesh.bounds for surface in self.traced.scene.surfaces])
         size = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
         cells = np.array(self.beam.shape[::-1]) / np.array(self.beam.size)
         return np.asarray(FUZZ * size * cells, dtype=np.float64)
@@ -67,15 +62,7 @@ class Probe:
         """
         inside = np.clip(at, RIM, np.array(self.beam.shape[::-1]) - RIM)
         rays = launch_at(self.beam, inside[:, 0], inside[:, 1])
-        paths = trace(
-            self.scene, rays, self.ccd, wavelength=self.wavelength, max_bounces=self.bounces,
-            min_amplitude=self.faintest, record=True,
-        )  # fmt: skip
-        if self.axis is not None:
-            paths = along(paths, self.axis)
-        if not self.half_wave_loss:
-            sign = 1.0 - 2.0 * (paths.reflections % 2)
-            paths = replace(paths, amplitude=paths.amplitude * sign)
+        paths = retrace(self.traced, rays, record=True, max_bounces=self.bounces, min_amplitude=self.faintest)
         rows, _, _ = landed(paths, self.ccd)
         rows = rows[np.isin(paths.key[rows], self.keys)]
         return paths, rows, *self._names(paths, rows)
@@ -108,7 +95,7 @@ class Probe:
 
 
 def profile(beam: Beam, at: FloatArray) -> FloatArray:
-    """Amplitude of a beam at points of its grid.
+    """Beam amplitude at points of its grid.
 
     Parameters
     ----------

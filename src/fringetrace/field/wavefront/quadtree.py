@@ -1,4 +1,4 @@
-"""Squares of the beam's grid and the lit pieces of them."""
+"""Quadtree squares of the beam's grid and their lit pieces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ STRIDE = 1 << 24
 
 
 def numbers(wave: Array, at: FloatArray, size: float) -> npt.NDArray[np.int64]:
-    """Numbers of the squares of a size that points of the beam's grid lie in.
+    """Numbers of the squares of one size that contain points of the beam's grid.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def numbers(wave: Array, at: FloatArray, size: float) -> npt.NDArray[np.int64]:
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Parts of cells of the beam's grid: rectangles, lit to the left of a chord.
+    """Lit pieces of cells: rectangles, lit to the left of a chord.
 
     Attributes
     ----------
@@ -60,40 +60,40 @@ class Pieces:
 
     @property
     def cut(self) -> npt.NDArray[np.bool_]:
-        """Which have a chord."""
+        """Which pieces have a chord."""
         return np.isfinite(self.chord[:, 0, 0])
 
     @property
     def whole(self) -> npt.NDArray[np.bool_]:
-        """Which are all of their cell."""
+        """Which pieces fill their cell."""
         return np.asarray(~self.cut & (self.high - self.low == 1.0).all(axis=1))
 
     @property
     def lines(self) -> FloatArray:
-        """(n, 3) a, b, c: lit where a s + b t >= c."""
+        """Chords (n, 3) a, b, c: lit where a s + b t >= c."""
         begin, end = self.chord[:, 0], self.chord[:, 1]
         a, b = begin[:, 1] - end[:, 1], end[:, 0] - begin[:, 0]
         line = np.stack([a, b, a * begin[:, 0] + b * begin[:, 1]], axis=1)
         return np.where(self.cut[:, None], line, (0.0, 0.0, -1.0))
 
     def numbers(self, size: float) -> npt.NDArray[np.int64]:
-        """Numbers of the squares of a size that they are part of."""
+        """Numbers of the squares of one size that contain the pieces."""
         return numbers(self.wave, 0.5 * (self.low + self.high), size)
 
     def part(self, rows: Array) -> Pieces:
-        """Some of them."""
+        """Subset of the pieces."""
         return Pieces(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     @staticmethod
     def joined(parts: list[Pieces]) -> Pieces:
-        """One table of several, at least one."""
+        """Concatenation of at least one table of pieces."""
         columns = ([getattr(part, field.name) for part in parts] for field in fields(Pieces))
         return Pieces(*(np.concatenate(column) for column in columns))
 
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Cells, or parts of them, that are all of a size: `lit` (n, 4) at the corners, from (0, 0) around.
+    """Squares of one size: `lit` (n, 4) at the corners, from (0, 0) around.
 
     `scale` (n,) is how many pixels a cell is wide.
     """
@@ -107,29 +107,29 @@ class Squares:
 
     @property
     def numbers(self) -> npt.NDArray[np.int64]:
-        """Numbers (n,) that tell them apart."""
+        """Numbers (n,) that identify the squares."""
         return numbers(self.wave, self.low + 0.5 * self.size, self.size)
 
     @property
     def whole(self) -> Pieces:
-        """All of each, as a piece."""
+        """Each whole square as a piece."""
         blank = np.full((len(self.low), 2, 2), np.nan)
         return Pieces(self.wave, self.cell, self.low, self.low + self.size, blank)
 
     def beside(self, chosen: Array) -> npt.NDArray[np.bool_]:
-        """Those of a wave that touch a chosen one, (n,) bool."""
+        """Which squares of a wave touch a chosen one, (n,) bool."""
         steps = np.array([i * STRIDE + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
         return np.isin(self.numbers, (self.numbers[chosen][:, None] + steps).ravel())
 
     def part(self, rows: Array) -> Squares:
-        """Some of them."""
+        """Subset of the squares."""
         return Squares(
             self.wave[rows], self.cell[rows], self.scale[rows], self.low[rows], self.lit[rows], self.size
         )
 
     @staticmethod
     def joined(parts: list[Squares]) -> Squares:
-        """One table of several of a size, at least one."""
+        """Concatenation of at least one table of squares of one size."""
         return Squares(
             wave=np.concatenate([part.wave for part in parts]),
             cell=np.concatenate([part.cell for part in parts]),
@@ -141,7 +141,7 @@ class Squares:
 
 
 def allowed(length: FloatArray, scale: FloatArray, size: float) -> FloatArray:
-    """How far chords may be off.
+    """Tolerance of chords.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def allowed(length: FloatArray, scale: FloatArray, size: float) -> FloatArray:
 
 
 def quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
-    """Four quarters of squares, with which of their corners are lit.
+    """Quarters of squares, with the lit state of their corners.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def quarters(probe: Probe, names: Array, squares: Squares) -> Squares:
 def denied(
     probe: Probe, names: Array, squares: Squares, pieces: Pieces, witnesses: Witnesses
 ) -> npt.NDArray[np.bool_]:
-    """Squares that rays find lit, or dark, where their pieces say otherwise.
+    """Squares whose pieces are contradicted by rays.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Fused float64 passes from sheets of arrivals to sample points on the pixels, compiled by numba.
+"""Compiled rasterisation of wavefront patches onto sample points of the pixels.
 
 A sheet maps grid coordinates (s along columns, t along rows) to CCD coordinates in pixels. A cell of
 a curved sheet has the fields X, Y, W, J, and the two parts of the amplitude, each as the 4 x 4
@@ -21,6 +21,9 @@ CELL, S0, S1, T0, T1, SIGN, LEFT, RIGHT, LOW, HIGH, A, B, C = range(13)
 REGULAR = 0.35
 # A regular leaf reaches this part of its width beyond its probes at most, a fold a few times that.
 MARGIN = 0.03
+# The remainder of a path in wavelengths is exact by a product of halves of float64's digits for fewer than
+# MANY of them: 2^26 and 2^27 + 1.
+MANY, SPLITTER = 67108864.0, 134217729.0
 # A cell is halved this often at most.
 DEPTH = 6
 # Cells own their sides shifted by this part of a cell: a sample exactly on a side has one owner.
@@ -29,7 +32,7 @@ NUDGE_S, NUDGE_T = 1.2345e-9, 2.7183e-9
 
 @part
 def patch(cells, cell, f, s, t):
-    """Value of field f of a cell and its derivatives along s and t."""
+    """Value of field f of a cell, with derivatives along s and t."""
     value, along_s, along_t = 0.0, 0.0, 0.0
     for i in range(3, -1, -1):
         c0, c1 = cells[cell, f, i, 0], cells[cell, f, i, 1]
@@ -55,7 +58,7 @@ def scalar(cells, cell, f, s, t):
 
 @jit
 def survey(cells, cell, s0, s1, t0, t1):
-    """Least and largest J, and the box, of part of a cell: of 5 x 5 probes, the box with a margin."""
+    """Range of J and bounding box over part of a cell, from 5 x 5 points, the box with a margin."""
     least, most = np.inf, -np.inf
     left, right, low, high = np.inf, -np.inf, np.inf, -np.inf
     for i in range(5):
@@ -70,8 +73,8 @@ def survey(cells, cell, s0, s1, t0, t1):
 
 
 @jit
-def split(cells, domain, lines, rows, columns):
-    """Leaves of cells, from their domains (s from and to, t from and to) and lines (a, b, c).
+def split_cells(cells, domain, lines, rows, columns):
+    """Quadtree leaves of cells, from their domains (s from and to, t from and to) and chords (a, b, c).
 
     Those that no pixel sees are left out.
     """
@@ -122,7 +125,7 @@ CLOSE = 1e-4
 
 @part
 def newton(px, py, xs, xt, ys, yt, area, x, y, wide, tall):
-    """Newton's step to (x, y) from a point of the map, of 3/4 leaf at most, and its full length in leaves."""
+    """Newton step to (x, y) from a point of the map, limited to 3/4 leaf, and its full length in leaves."""
     dx, dy = x - px, y - py
     ds, dt = (yt * dx - xt * dy) / area, (xs * dy - ys * dx) / area
     stretch = max(abs(ds) / wide, abs(dt) / tall)
@@ -133,7 +136,7 @@ def newton(px, py, xs, xt, ys, yt, area, x, y, wide, tall):
 
 @part
 def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
-    """Where in a regular leaf the map meets (x, y), from (s, t) on: found, s, t and the Jacobian there."""
+    """Root (s, t) of the map at (x, y) in a regular leaf: found, s, t and the Jacobian there."""
     wide, tall = s1 - s0, t1 - t0
     area = 0.0
     for _ in range(12):
@@ -155,7 +158,7 @@ def root(cells, cell, s0, s1, t0, t1, sign, s, t, x, y):
 
 @part
 def plain(cells, cell, s, t, area, unit, period):
-    """The wave of one branch: amplitude, spread over |area|, and path."""
+    """Wave of one branch: amplitude, spread over |area|, and path."""
     way = scalar(cells, cell, 2, s, t)
     amplitude = complex(scalar(cells, cell, 4, s, t), scalar(cells, cell, 5, s, t))
     turn = 2.0 * np.pi * ((way % period) / period)
@@ -173,14 +176,17 @@ def gradient(cells, cell, s, t):
 
 
 @jit
-def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y, field, slope):
-    """Add the waves of regular leaves to the sample points of a band of pixels that begins at row `top`.
+def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y, slope):
+    """Contributions of regular leaves at the sample points of a band of pixels from row `top` on.
 
-    `folded` marks cells in which J changes its sign, `turns` has their caustics passed where J < 0
-    and where J > 0, `unit` is the beam area of a cell in pixels. `slope` (lowest and highest of both
-    gradients of the path, metres a pixel) is widened to what each sample has seen.
+    A row for each: the number of the point, the optical path, real and imaginary part of each component
+    of the amplitude. `folded` marks cells in which J changes its sign, `turns` has their caustics passed
+    where J < 0 and where J > 0, `unit` is the beam area of a cell in pixels. `slope` (lowest and highest
+    of both gradients of the path, metres a pixel) is widened to what each point has seen.
     """
-    rows = (len(first) - 1) // columns
+    rows, components = (len(first) - 1) // columns, (cells.shape[1] - 4) // 2
+    found = np.empty((len(x) + 16, 2 + 2 * components))
+    count = 0
     for row in range(len(leaves)):
         leaf = leaves[row]
         cell = int(leaf[CELL])
@@ -197,37 +203,77 @@ def spread(leaves, cells, folded, turns, unit, period, top, columns, first, x, y
             for j in range(begin, end + 1):
                 pixel = (i - top) * columns + j
                 for k in range(first[pixel], first[pixel + 1]):
-                    found, a, b, area = root(cells, cell, s0, s1, t0, t1, sign, s, t, x[k], y[k])
-                    if not found or leaf[A] * a + leaf[B] * b < leaf[C]:
+                    there, a, b, area = root(cells, cell, s0, s1, t0, t1, sign, s, t, x[k], y[k])
+                    if not there or leaf[A] * a + leaf[B] * b < leaf[C]:
                         continue
                     s, t = a, b  # the next sample is near
-                    spreading = area if bent else scalar(cells, cell, 3, a, b)
-                    field[k] += phase * plain(cells, cell, a, b, spreading, unit, period)
+                    size = np.sqrt(unit / abs(area if bent else scalar(cells, cell, 3, a, b))) * phase
+                    if count == len(found):
+                        found = grown(found)
+                    found[count, 0], found[count, 1] = k, scalar(cells, cell, 2, a, b)
+                    for c in range(2, 2 + 2 * components, 2):
+                        real, imaginary = (
+                            scalar(cells, cell, c + 2, a, b),
+                            scalar(cells, cell, c + 3, a, b),
+                        )
+                        light = size * complex(real, imaginary)
+                        found[count, c], found[count, c + 1] = light.real, light.imag
+                    count += 1
                     if len(slope) > 0:
                         across, up = gradient(cells, cell, a, b)
                         widen(slope[k], across, up)
+    return found[:count]
+
+
+@jit
+def add_waves(rows, begin, component, period, group, factor, field):
+    """Add waves at a wavelength to the fields of their groups; `rows` as in `leaf_contributions`.
+
+    Those of wave w are rows begin[w] to begin[w + 1]; they are multiplied by factor[w].
+    """
+    c = 2 + 2 * component
+    # the wavelength in two parts (T. J. Dekker, Numer. Math. 18 (1971) 224): n times the longer is exact
+    long = period * SPLITTER
+    long -= long - period
+    short = period - long
+    for wave in range(len(begin) - 1):
+        light, there = factor[wave], field[group[wave]]
+        for row in range(begin[wave], begin[wave + 1]):
+            way = rows[row, 1]
+            number = np.rint(way / period)
+            rest = (way - number * long) - number * short if abs(number) < MANY else way % period
+            turn = 2.0 * np.pi * (rest / period)
+            wave_here = complex(rows[row, c], rows[row, c + 1]) * complex(np.cos(turn), np.sin(turn))
+            there[int(rows[row, 0])] += light * wave_here
 
 
 @part
 def widen(slope, across, up):
-    """Let a range take in one more gradient."""
+    """Extend a range by one gradient."""
     slope[0], slope[1] = min(slope[0], across), max(slope[1], across)
     slope[2], slope[3] = min(slope[2], up), max(slope[3], up)
 
 
 @jit
-def spread_flat(
-    inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, period, first,
-    x, y, where_x, where_y, shape, field, slope, pixels,
+def plane_wave_contributions(
+    inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, first,
+    x, y, where_x, where_y, shape, slope, pixels,
 ):  # fmt: skip
-    """Add a plane wave to the sample points that its region of the beam reaches.
+    """Contributions of a plane wave at the sample points that its region of the beam reaches.
 
     (s, t) = inverse (point - origin); the path at the origin is `path`, its gradient `gradient`.
     `kind` of each cell from (low_s, low_t) on: 0 dark, 1 lit, 2 in pieces, those of the cell from
     begin[cell] on. A piece is s, t from, s, t to, and a, b, c: lit where a s + b t > c. A point belongs
     to the region if (where_x, where_y) does. `pixels` of the band: first and last row, column.
+    `amplitude` is (points or 1, components). Rows are as those of `leaf_contributions`.
     """
     rows, columns = kind.shape
+    components = amplitude.shape[1]
+    most = 0
+    for i in range(pixels[0], pixels[1]):
+        most += first[i * shape + pixels[3]] - first[i * shape + pixels[2]]
+    found = np.empty((most, 2 + 2 * components))
+    count = 0
     for i in range(pixels[0], pixels[1]):
         for pixel in range(i * shape + pixels[2], i * shape + pixels[3]):
             for k in range(first[pixel], first[pixel + 1]):
@@ -249,9 +295,11 @@ def spread_flat(
                     if not lit:
                         continue
                 dx, dy = x[k] - origin[0], y[k] - origin[1]
-                way = path + gradient[0] * dx + gradient[1] * dy
-                turn = 2.0 * np.pi * ((way % period) / period)
-                size = amplitude[k] if len(amplitude) > 1 else amplitude[0]
-                field[k] += size * complex(np.cos(turn), np.sin(turn))
+                found[count, 0], found[count, 1] = k, path + gradient[0] * dx + gradient[1] * dy
+                light = amplitude[k] if len(amplitude) > 1 else amplitude[0]
+                for c in range(components):
+                    found[count, 2 + 2 * c], found[count, 3 + 2 * c] = light[c].real, light[c].imag
+                count += 1
                 if len(slope) > 0:
                     widen(slope[k], gradient[0], gradient[1])
+    return found[:count]

@@ -1,4 +1,4 @@
-"""Tubes of neighbouring rays: differences across a grid of them, and the caustics that they have passed."""
+"""Ray tubes: derivatives across a grid of rays, and the caustics they have passed (KMAH index)."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ STENCILS = (
 
 
 def differences(values: FloatArray, axis: int) -> FloatArray:
-    """Derivative along an axis of a grid, to fourth order where five neighbours are there.
+    """Derivative along an axis of a grid, of fourth order where five neighbours exist.
 
     Parameters
     ----------
@@ -49,15 +49,20 @@ def differences(values: FloatArray, axis: int) -> FloatArray:
         low, high = -begin, count - (begin + len(weights) - 1)
         if low >= high:
             continue
-        estimate = sum(w * f[low + begin + i : high + begin + i] for i, w in enumerate(weights))
-        # 0 * NaN is NaN: a stencil with a hole in it gives none
+        # only the rows that no stencil before has filled
         open_ = np.isnan(result[low:high])
-        result[low:high] = np.where(open_, estimate, result[low:high])
+        rows = low + np.flatnonzero(open_.reshape(high - low, -1).any(axis=1))
+        if len(rows) == 0:
+            continue
+        first, last = int(rows[0]), int(rows[-1]) + 1
+        # 0 * NaN is NaN: a stencil with a hole in it gives none
+        estimate = sum(w * f[first + begin + i : last + begin + i] for i, w in enumerate(weights))
+        result[first:last] = np.where(open_[first - low : last - low], estimate, result[first:last])
     return np.asarray(np.moveaxis(result, 0, axis), dtype=np.float64)
 
 
 def along_grid(values: FloatArray) -> FloatArray:
-    """Derivatives of values along the columns and the rows of a grid.
+    """Derivatives along the columns and the rows of a grid.
 
     Parameters
     ----------
@@ -83,7 +88,7 @@ def _across(direction: FloatArray) -> tuple[FloatArray, FloatArray]:
 def caustics(
     way: FloatArray, arrival: FloatArray, last: FloatArray, slopes: Callable[[FloatArray], FloatArray]
 ) -> npt.NDArray[np.int64]:
-    """Caustics that each ray of a sheet has passed (KMAH index): principal wavefront curvatures count.
+    """Caustics that each ray has passed (KMAH index), from principal wavefront curvatures.
 
     Between two surfaces the ray tube has the cross-section det(Q0 + s Q1), where Q0 and Q1 are the
     differentials of position and direction across the ray. Q1 Q0^-1 is the wavefront's curvature,

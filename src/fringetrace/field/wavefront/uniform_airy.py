@@ -1,4 +1,4 @@
-"""Folds of sheets (caustics on the CCD): the waves beside them, uniform across (Airy).
+"""Uniform Airy field across folds (caustics on the CCD), after Chester, Friedman and Ursell.
 
 Where the Jacobian J of the map from the beam's grid to the CCD changes its sign, two branches of a
 sheet end. On the lit side of a fold they add to
@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import ComplexArray, FloatArray, jit, part
-from fringetrace.field.pixel_quadrature import Samples
+from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront import raster_kernels
 from fringetrace.field.wavefront.fold_branches import (
     CLEAR,
@@ -34,12 +34,13 @@ from fringetrace.field.wavefront.fold_branches import (
     TURNS,
     WAY,
     Z,
-    beside,
+    branches_beside_folds,
     resolve,
     seeds,
     taken,
     widen_beside,
 )
+from fringetrace.field.wavefront.patches import PatchCells
 from fringetrace.field.wavefront.raster_kernels import (
     CELL,
     HIGH,
@@ -67,7 +68,7 @@ from fringetrace.field.wavefront.raster_kernels import (
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """Cells of a sheet as `sheets.Cells` has them, and the folds on it.
+    """Folds of a wavefront at a wavelength, with its `PatchCells`.
 
     Attributes
     ----------
@@ -97,43 +98,38 @@ class Folds:
     unit: float
 
 
-def folds(
-    coefficients: FloatArray, leaves: FloatArray, folded: npt.NDArray[np.bool_], turns: npt.NDArray[np.int64],
-    place: npt.NDArray[np.int64], period: float, unit: float,
-) -> Folds:  # fmt: skip
-    """Find the folds of a sheet.
+def folds(sheet: PatchCells, period: float, unit: float, component: int = 0) -> Folds:
+    """Find the folds of a wavefront.
 
     Parameters
     ----------
-    coefficients, leaves, folded, turns, place
-        Of `sheets.Cells`.
+    sheet : PatchCells
     period : float, metres
         Wavelength.
     unit : float
         Beam area of a cell in pixels.
+    component : int
+        Of light with a polarisation.
 
     Returns
     -------
     Folds
     """
+    coefficients, leaves, turns, place = sheet.component(component), sheet.leaves, sheet.turns, sheet.place
     squares = np.flatnonzero((place >= 0).all(axis=1))
     index = np.full(place.max(axis=0, initial=-1) + 1, -1, dtype=np.int64)
     index[tuple(place[squares].T)] = squares
     lines = np.tile([0.0, 0.0, -1.0], (len(place), 1))
     lines[leaves[:, CELL].astype(np.int64)] = leaves[:, A : C + 1]
-    # J at the corners of each cell
-    corner = np.array([[1.0, 0.0, 0.0, 0.0], [1.0, 1.0, 1.0, 1.0]])
-    corners = np.einsum("si,nij,tj->nst", corner, coefficients[:, 3], corner)
-    signs = (corners.min(axis=(1, 2)) <= 0.0) & (corners.max(axis=(1, 2)) >= 0.0)
-    crossed = np.flatnonzero(signs & (place >= 0).all(axis=1))
+    crossed = np.flatnonzero(sheet.crossed)
     found = np.empty((0, 11))
     if len(crossed):
         found = seeds(coefficients, index, turns, place, crossed, 2.0 * np.pi / period)
-    return Folds(coefficients, leaves, folded, turns, place, index, lines, found, period, unit)
+    return Folds(coefficients, leaves, sheet.folded, turns, place, index, lines, found, period, unit)
 
 
 def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
-    """Field of a sheet at sample points.
+    """Field of a wavefront at sample points.
 
     Parameters
     ----------
@@ -156,20 +152,24 @@ def light(sheet: Folds, points: Samples, slope: FloatArray) -> ComplexArray:
         widen_beside(sheet.seeds, 2.0 * np.pi / sheet.period, *grid[:3], points.x, points.y, slope)
     if len(sheet.seeds):
         wavenumber = 2.0 * np.pi / sheet.period
-        rows = beside(
+        rows = branches_beside_folds(
             sheet.seeds, sheet.coefficients, sheet.index, sheet.lines, sheet.turns, wavenumber, *grid, latest
         )
         resolve(rows, latest)
         near |= touched(latest, points, sheet.leaves)
-    raster_kernels.spread(sheet.leaves[~near], *cells, *grid, field, slope)
+    apart = raster_kernels.leaf_contributions(sheet.leaves[~near], *cells[:4], *grid, slope)
+    one = np.array([1.0 + 0.0j])
+    raster_kernels.add_waves(
+        apart, np.array([0, len(apart)]), 0, sheet.period, np.zeros(1, np.int64), one, field[None]
+    )
     if near.any():
-        spread(sheet.leaves[near], *cells, sheet.place, rows, latest, *grid, field, slope)
+        add_folds(sheet.leaves[near], *cells, sheet.place, rows, latest, *grid, field, slope)
     np.add.at(field, rows[:, SAMPLE].astype(np.int64), np.sqrt(sheet.unit) * uniform(rows, sheet.period))
     return np.asarray(field, dtype=np.complex128)
 
 
 def uniform(rows: FloatArray, period: float) -> ComplexArray:
-    """The field of two branches by the formula above, or what it has beyond rays' (Airy's asymptotes)."""
+    """Uniform Airy field of two branches, or its difference from the ray field (Airy's asymptotes)."""
     from scipy.special import airy
 
     ai, slope, _, _ = airy(-rows[:, Z])
@@ -184,7 +184,7 @@ def uniform(rows: FloatArray, period: float) -> ComplexArray:
 
 
 def touched(latest: npt.NDArray[np.int64], points: Samples, leaves: FloatArray) -> npt.NDArray[np.bool_]:
-    """Whether the box of each leaf holds a pixel with a sample beside a fold."""
+    """Whether the box of each leaf contains a pixel with a sample beside a fold."""
     sample = np.concatenate([[0], np.cumsum(latest >= 0)])
     pixels = (np.diff(sample[points.first]) > 0).reshape(-1, points.columns)
     total = np.pad(pixels.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0)))
@@ -198,7 +198,7 @@ def touched(latest: npt.NDArray[np.int64], points: Samples, leaves: FloatArray) 
 
 @part
 def inside(cells, cell, leaf, sign, s, t, x, y):
-    """Where in a leaf a branch of the map meets (x, y), from (s, t) on: found, s, t and the Jacobian."""
+    """Root (s, t) of the map at (x, y) in a leaf, with the Jacobian there."""
     wide, tall = leaf[S1] - leaf[S0], leaf[T1] - leaf[T0]
     leave = 2.0 if leaf[SIGN] == 0.0 else 0.5
     area = 0.0
@@ -224,7 +224,7 @@ def inside(cells, cell, leaf, sign, s, t, x, y):
 
 @jit
 def halved(cells, cell, sign, s, t, ds, dt):
-    """A step, halved until it does not cross the fold."""
+    """Newton step halved until it does not cross the fold."""
     for _ in range(6):
         _, xs, xt = patch(cells, cell, 0, s + ds, t + dt)
         _, ys, yt = patch(cells, cell, 1, s + ds, t + dt)
@@ -236,7 +236,7 @@ def halved(cells, cell, sign, s, t, ds, dt):
 
 @part
 def probe(cells, cell, leaf, sign):
-    """Where to start in a leaf: its middle, or in a fold the probe with the largest J of that sign."""
+    """Start of the root search in a leaf: its middle, or the point with the largest J of one sign."""
     best, at_s, at_t = 0.0, 0.5 * (leaf[S0] + leaf[S1]), 0.5 * (leaf[T0] + leaf[T1])
     if leaf[SIGN] != 0.0:
         return True, at_s, at_t
@@ -253,10 +253,10 @@ def probe(cells, cell, leaf, sign):
 
 
 @jit
-def spread(
+def add_folds(
     leaves, cells, folded, turns, unit, period, place, rows, latest, top, columns, first, x, y, field, slope
 ):
-    """Add the waves of leaves on and beside folds, but those that `rows` have, see `raster.spread`."""
+    """Add the waves of leaves on and beside folds, except `rows`; see `leaf_contributions`."""
     for leaf in leaves:
         cell = int(leaf[CELL])
         low, above = max(int(np.floor(leaf[LOW])), top), int(np.floor(leaf[HIGH]))

@@ -1,4 +1,4 @@
-"""What a beam's grid sees: sequences of surfaces from its nodes, and what hides between them."""
+"""Visibility from the beam's grid: surface sequences at its nodes, and features between them."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
-from fringetrace.field.wavefront.feature_edges import beside
+from fringetrace.field.wavefront.feature_edges import places_beside_edges
 from fringetrace.field.wavefront.patches import checked
 from fringetrace.field.wavefront.probe import Probe
-from fringetrace.scene import CCD, parted
+from fringetrace.scene import CCD, group_facets
 from fringetrace.tracing import Paths, join, landed
 
 # Rays sent beside edges of meshes, as many times the nodes.
@@ -23,7 +23,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Witnesses:
-    """Lines on the beam's grid, or points, along which a sequence of surfaces is lit, or dark.
+    """Samples (lines or points) on the beam's grid where a surface sequence is lit, or dark.
 
     Attributes
     ----------
@@ -40,12 +40,12 @@ class Witnesses:
     lit: Mask
 
     def part(self, rows: Array) -> Witnesses:
-        """Some of them."""
+        """Subset of the samples."""
         return Witnesses(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     @staticmethod
     def joined(parts: list[Witnesses]) -> Witnesses:
-        """One table of several; of none, an empty one."""
+        """Concatenation of tables; an empty one of none."""
         none = Witnesses(
             np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty((0, 2)), np.empty(0, dtype=np.bool_)
         )
@@ -53,14 +53,14 @@ class Witnesses:
         return Witnesses(*(np.concatenate(column) for column in columns))
 
     def numbered(self, waves: list[int]) -> Witnesses:
-        """Those of some sequences, which are counted from 0 on in their order."""
+        """Samples of some sequences, numbered from 0 in their order."""
         number = np.full(max(int(self.wave.max(initial=0)), *waves, 0) + 1, -1)
         number[waves] = np.arange(len(waves))
         wave = number[self.wave]
         return replace(self, wave=wave).part(wave >= 0)
 
     def points(self, apart: float) -> tuple[npt.NDArray[np.int64], FloatArray]:
-        """Which of them, and points (m, 2) along them, both ends and no farther apart than so."""
+        """Points (m, 2) along the samples, both ends and no farther apart than so, with their owners."""
         way = self.end - self.begin
         count = np.ceil(np.abs(way).max(axis=1, initial=0.0) / apart).astype(np.int64) + 1
         row = np.repeat(np.arange(len(count)), count)
@@ -71,7 +71,7 @@ class Witnesses:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """Paths from the nodes of a beam's grid and from places between them, sorted by name.
+    """Paths from the nodes of a beam's grid and from points between them, sorted by sequence.
 
     Attributes
     ----------
@@ -104,7 +104,7 @@ class Survey:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns of nodes."""
+        """Rows and columns of the nodes."""
         tall, wide = self.probe.beam.shape
         return tall + 1, wide + 1
 
@@ -114,11 +114,11 @@ class Survey:
         return self.paths.key[self.first]
 
     def corners(self, index: int) -> Mask:
-        """Which corners of the grid's cells a sequence is lit at, (rows, columns, 4), from (0, 0) around."""
+        """Lit corners of each cell for a sequence, (rows, columns, 4), from (0, 0) around."""
         return _corners(self.paths.ray[self.rows[index]], self.shape)
 
     def cells(self, index: int) -> Mask:
-        """Cells (rows, columns) that a sequence may light: where it was seen, and all their neighbours."""
+        """Cells (rows, columns) that a sequence may light: where it was found, and their neighbours."""
         seen = np.asarray(self.corners(index).any(axis=-1))
         witnesses = self.witnesses.part((self.witnesses.wave == index) & self.witnesses.lit)
         seen[tuple(_cell(witnesses.points(0.5)[1], self.probe.beam.shape))] = True
@@ -126,7 +126,7 @@ class Survey:
 
 
 def widened(mask: Array) -> Mask:
-    """A mask (rows, columns) and all its neighbours."""
+    """Mask (rows, columns) with all neighbours."""
     rows, columns = mask.shape
     wide = np.pad(mask, 1)
     window = range(3)
@@ -145,8 +145,8 @@ def _cell(at: FloatArray, shape: tuple[int, int]) -> npt.NDArray[np.int64]:
     return np.clip(np.floor(at[:, ::-1]), 0, np.array(shape) - 1).astype(np.int64).T
 
 
-def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = None) -> Survey:
-    """Trace anew from the nodes of a beam's grid, and where features may hide between them.
+def survey(paths: Paths) -> Survey:
+    """Trace from the nodes of a beam's grid, and from points where features may hide between them.
 
     Rays are sent to either side of the edges of meshes: rims, edges between facets, and silhouettes;
     and from the centres of cells where `paths` met other surfaces than the rays from all four corners.
@@ -161,10 +161,6 @@ def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = 
     ----------
     paths : Paths
         Of a `Beam` onto a CCD; sequences of surfaces that are missing here are left out.
-    half_wave_loss : bool
-        False leaves out the factor -1 of each reflection off a mirror.
-    axis : (3,) float64, optional
-        Of light with a polarisation, the amplitude is the field along it.
 
     Returns
     -------
@@ -175,13 +171,13 @@ def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = 
     ValueError
         If the source is no beam, or there is no CCD.
     """
-    probe = _probe(paths, half_wave_loss, axis)
+    probe = _probe(paths)
     shape = probe.beam.shape[0] + 1, probe.beam.shape[1] + 1
     row, column = np.indices(shape)
     nodes = np.stack([column.ravel(), row.ravel()], axis=1).astype(np.float64)
     traced, rows, found, curved = probe.paths(nodes)
     centres = _differing(paths, probe.ccd, traced.ray[rows], traced.key[rows], shape)
-    between, goes_on = beside(traced, shape, MOST * len(nodes))
+    between, goes_on = places_beside_edges(traced, shape, MOST * len(nodes))
     extra = np.concatenate([between, centres])
     goes_on = np.concatenate([goes_on, np.zeros(len(centres), dtype=np.bool_)])
     more, others, its, bent = probe.paths(extra)
@@ -206,16 +202,13 @@ def survey(paths: Paths, half_wave_loss: bool = True, axis: FloatArray | None = 
     )  # fmt: skip
 
 
-def _probe(paths: Paths, half_wave_loss: bool, axis: FloatArray | None) -> Probe:
+def _probe(paths: Paths) -> Probe:
     """A probe for what paths of a beam took."""
     ccd, beam = checked(paths)
     rows, _, _ = landed(paths, ccd)
     keys, bounces = np.unique(paths.key[rows]), int(paths.bounces[rows].max(initial=0))
     faintest = 0.5 * float(np.abs(paths.amplitude[rows]).min(initial=1.0))
-    return Probe(
-        paths.scene, beam, ccd, parted(paths.scene), keys, bounces, faintest, half_wave_loss,
-        paths.wavelength, axis,
-    )  # fmt: skip
+    return Probe(paths, beam, ccd, group_facets(paths.scene), keys, bounces, faintest)
 
 
 def _differing(paths: Paths, ccd: CCD, node: Array, keys: Names, shape: tuple[int, int]) -> FloatArray:

@@ -1,4 +1,4 @@
-from .dispersion import Formula as Formula, Table as Table
+from .dispersion import IndexFormula as IndexFormula, IndexTable as IndexTable
 from .material import (
     Material as Material,
     absorbing as absorbing,

@@ -1,4 +1,4 @@
-"""Curves of one number over the vacuum wavelength: formulas by their coefficients, and tables.
+"""Dispersion formulas and tables: refractive index over the vacuum wavelength.
 
 Wavelengths are in micrometres here, as in all published coefficients; `materials` has metres.
 """
@@ -19,28 +19,28 @@ def _pairs(c: Coefficients) -> list[tuple[float, float]]:
     return list(zip(c[0::2], c[1::2], strict=True))
 
 
-def constant(w: FloatArray, c: Coefficients) -> FloatArray:
-    """c0."""
+def _constant(w: FloatArray, c: Coefficients) -> FloatArray:
+    """Constant c0."""
     return np.full_like(w, c[0])
 
 
-def sellmeier(w: FloatArray, c: Coefficients) -> FloatArray:
-    """n^2 = 1 + c0 + sum of ci w^2 / (w^2 - cj^2): resonances by their wavelengths (formula 1)."""
+def _sellmeier(w: FloatArray, c: Coefficients) -> FloatArray:
+    """Sellmeier formula n^2 = 1 + c0 + sum of ci w^2 / (w^2 - cj^2) (formula 1)."""
     return np.sqrt(1.0 + c[0] + sum(b * w**2 / (w**2 - r**2) for b, r in _pairs(c[1:])))
 
 
 def sellmeier2(w: FloatArray, c: Coefficients) -> FloatArray:
-    """n^2 = 1 + c0 + sum of ci w^2 / (w^2 - cj): by their squares, as in glass catalogues (formula 2)."""
+    """Sellmeier formula n^2 = 1 + c0 + sum of ci w^2 / (w^2 - cj), as in glass catalogues (formula 2)."""
     return np.sqrt(1.0 + c[0] + sum(b * w**2 / (w**2 - r) for b, r in _pairs(c[1:])))
 
 
 def polynomial(w: FloatArray, c: Coefficients) -> FloatArray:
-    """n^2 = c0 + sum of ci w^cj (formula 3)."""
+    """Polynomial n^2 = c0 + sum of ci w^cj (formula 3)."""
     return np.sqrt(c[0] + sum(b * w**p for b, p in _pairs(c[1:])))
 
 
 def mixed(w: FloatArray, c: Coefficients) -> FloatArray:
-    """n^2 = c0 + up to two of ci w^cj / (w^2 - ck^cl) + sum of ci w^cj (formula 4)."""
+    """Dispersion formula n^2 = c0 + up to two of ci w^cj / (w^2 - ck^cl) + sum of ci w^cj (formula 4)."""
     square = np.full_like(w, c[0])
     poles = min(len(c) - 1, 8) // 4 * 4
     for first in range(1, poles + 1, 4):
@@ -49,47 +49,47 @@ def mixed(w: FloatArray, c: Coefficients) -> FloatArray:
     return np.sqrt(square + sum(b * w**p for b, p in _pairs(c[1 + poles :])))
 
 
-def cauchy(w: FloatArray, c: Coefficients) -> FloatArray:
-    """Cauchy's n = c0 + sum of ci w^cj (formula 5)."""
+def _cauchy(w: FloatArray, c: Coefficients) -> FloatArray:
+    """Cauchy formula n = c0 + sum of ci w^cj (formula 5)."""
     return np.asarray(c[0] + sum(b * w**p for b, p in _pairs(c[1:])), dtype=np.float64)
 
 
 def gas(w: FloatArray, c: Coefficients) -> FloatArray:
-    """Of gases: n = 1 + c0 + sum of ci / (cj - w^-2) (formula 6)."""
+    """Dispersion formula of gases, n = 1 + c0 + sum of ci / (cj - w^-2) (formula 6)."""
     return np.asarray(1.0 + c[0] + sum(b / (r - w**-2) for b, r in _pairs(c[1:])), dtype=np.float64)
 
 
 def herzberger(w: FloatArray, c: Coefficients) -> FloatArray:
-    """Herzberger's n = c0 + c1 L + c2 L^2 + c3 w^2 + c4 w^4 + ..., L = 1 / (w^2 - 0.028) (formula 7)."""
+    """Herzberger formula n = c0 + c1 L + c2 L^2 + c3 w^2 + ..., L = 1 / (w^2 - 0.028) (formula 7)."""
     pole = 1.0 / (w**2 - 0.028)
     even = sum(b * w ** (2 * k + 2) for k, b in enumerate(c[3:]))
     return np.asarray(c[0] + c[1] * pole + c[2] * pole**2 + even, dtype=np.float64)
 
 
 def retro(w: FloatArray, c: Coefficients) -> FloatArray:
-    """(n^2 - 1) / (n^2 + 2) = c0 + c1 w^2 / (w^2 - c2) + c3 w^2 (formula 8)."""
+    """Dispersion formula (n^2 - 1) / (n^2 + 2) = c0 + c1 w^2 / (w^2 - c2) + c3 w^2 (formula 8)."""
     ratio = c[0] + c[1] * w**2 / (w**2 - c[2]) + c[3] * w**2
     return np.sqrt((1.0 + 2.0 * ratio) / (1.0 - ratio))
 
 
 def exotic(w: FloatArray, c: Coefficients) -> FloatArray:
-    """n^2 = c0 + c1 / (w^2 - c2) + c3 (w - c4) / ((w - c4)^2 + c5) (formula 9)."""
+    """Dispersion formula n^2 = c0 + c1 / (w^2 - c2) + c3 (w - c4) / ((w - c4)^2 + c5) (formula 9)."""
     return np.sqrt(c[0] + c[1] / (w**2 - c[2]) + c[3] * (w - c[4]) / ((w - c[4]) ** 2 + c[5]))
 
 
 def exponential(w: FloatArray, c: Coefficients) -> FloatArray:
-    """c0 exp(-w / c1), as the absorption of melanin falls."""
+    """Exponential c0 exp(-w / c1), the absorption of melanin."""
     return np.asarray(c[0] * np.exp(-w / c[1]), dtype=np.float64)
 
 
 # By name: the function, and the numbers of coefficients that it takes.
 FORMS: dict[str, tuple[Callable[[FloatArray, Coefficients], FloatArray], range]] = {
-    "constant": (constant, range(1, 2)),
-    "formula 1": (sellmeier, range(1, 18, 2)),
+    "constant": (_constant, range(1, 2)),
+    "formula 1": (_sellmeier, range(1, 18, 2)),
     "formula 2": (sellmeier2, range(1, 18, 2)),
     "formula 3": (polynomial, range(1, 18, 2)),
     "formula 4": (mixed, range(1, 18, 2)),
-    "formula 5": (cauchy, range(1, 18, 2)),
+    "formula 5": (_cauchy, range(1, 18, 2)),
     "formula 6": (gas, range(1, 18, 2)),
     "formula 7": (herzberger, range(3, 7)),
     "formula 8": (retro, range(4, 5)),
@@ -99,8 +99,8 @@ FORMS: dict[str, tuple[Callable[[FloatArray, Coefficients], FloatArray], range]]
 
 
 @dataclass(frozen=True)
-class Formula:
-    """A curve by one of `FORMS`; numbers 1 to 9 are those of refractiveindex.info.
+class IndexFormula:
+    """Dispersion curve by one of `FORMS`; numbers 1 to 9 are those of refractiveindex.info.
 
     Parameters
     ----------
@@ -132,14 +132,14 @@ class Formula:
         checked_range(self.range, f"dispersion {self.form}")
 
     def at(self, wavelength: FloatArray) -> FloatArray:
-        """The value at wavelengths in micrometres, any shape; NaN where the formula has none."""
+        """Value at wavelengths in micrometres, any shape; NaN where the formula has none."""
         with np.errstate(all="ignore"):
             return np.asarray(FORMS[self.form][0](wavelength, self.coefficients), dtype=np.float64)
 
 
 @dataclass(frozen=True)
-class Table:
-    """A curve through points, straight from each to the next.
+class IndexTable:
+    """Dispersion curve by linear interpolation between measured points.
 
     Parameters
     ----------
@@ -177,15 +177,15 @@ class Table:
         return self.wavelength[0], self.wavelength[-1]
 
     def at(self, wavelength: FloatArray) -> FloatArray:
-        """The value at wavelengths in micrometres, any shape."""
+        """Value at wavelengths in micrometres, any shape."""
         return np.asarray(np.interp(wavelength, self.wavelength, self.value), dtype=np.float64)
 
 
-Curve = Formula | Table
+Curve = IndexFormula | IndexTable
 
 
 def checked_range(limits: tuple[float, float] | None, what: str) -> None:
-    """Refuse a range of wavelengths that does not run from a positive to a longer one.
+    """Checked wavelength range, from a positive wavelength to a longer one; else ValueError.
 
     Parameters
     ----------

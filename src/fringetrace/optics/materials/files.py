@@ -1,4 +1,4 @@
-"""Files of refractive indices: tables as CSV, and the YAML of refractiveindex.info."""
+"""Refractive index files: CSV tables, and YAML pages of refractiveindex.info."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from fringetrace.core import FloatArray, um, unit_length
-from fringetrace.optics.materials.dispersion import Curve, Formula, Table
+from fringetrace.optics.materials.dispersion import Curve, IndexFormula, IndexTable
 
 # Columns of the tables in YAML.
 COLUMNS = {"tabulated nk": 3, "tabulated n": 2, "tabulated k": 2}
-Curves = tuple[Curve | None, Curve | None, str]
+IndexData = tuple[Curve | None, Curve | None, str]
 
 
 def _rows(text: str, columns: tuple[int, ...], what: str) -> FloatArray:
@@ -35,15 +35,15 @@ def _rows(text: str, columns: tuple[int, ...], what: str) -> FloatArray:
     return np.array(rows)
 
 
-def _table(wavelength: FloatArray, value: FloatArray, what: str) -> Table:
+def _table(wavelength: FloatArray, value: FloatArray, what: str) -> IndexTable:
     try:
-        return Table(tuple(wavelength.tolist()), tuple(value.tolist()))
+        return IndexTable(tuple(wavelength.tolist()), tuple(value.tolist()))
     except ValueError as error:
         raise ValueError(f"{what}: {error}") from None
 
 
-def read_csv(path: Path, unit: str | None) -> Curves:
-    """Curves of a table: wavelength, n and, if there is a third column, kappa.
+def read_index_csv(path: Path, unit: str | None) -> IndexData:
+    """Read n and kappa from a CSV table: wavelength, n and, if there is a third column, kappa.
 
     Lines from # on are remarks; those before the table are its source. A first line of words
     names the columns; the unit stands in it behind the wavelength, as ``wavelength (nm),n,k``.
@@ -114,13 +114,13 @@ def _entry(entry: Any, what: str) -> tuple[Curve | None, Curve | None]:
     if kind == "formula 7":  # even powers of the wavelength may be left out
         coefficients += (0.0,) * (3 - len(coefficients))
     try:
-        return Formula(str(kind), coefficients, (limits[0], limits[1])), None
+        return IndexFormula(str(kind), coefficients, (limits[0], limits[1])), None
     except ValueError as error:
         raise ValueError(f"{what}: {error}") from None
 
 
-def read_yaml(path: Path) -> Curves:
-    """Curves of a page of refractiveindex.info: formulas 1 to 9, tables of n, k or both.
+def read_yaml(path: Path) -> IndexData:
+    """Read n and kappa from a page of refractiveindex.info: formulas 1 to 9, tables of n, k or both.
 
     Parameters
     ----------

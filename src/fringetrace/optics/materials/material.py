@@ -1,4 +1,4 @@
-"""Materials: complex refractive indices n + i kappa over the vacuum wavelength.
+"""Materials: complex refractive index n + i kappa over the vacuum wavelength.
 
 With fields as exp(+i k n x), kappa > 0 absorbs. Outside the range that was measured there is no index.
 """
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import ComplexArray, nm, um
-from fringetrace.optics.materials.dispersion import Curve, Formula, Table
+from fringetrace.optics.materials.dispersion import Curve, IndexFormula, IndexTable
 
 # Wavelengths in metres are rounded: the ends of a range belong to it.
 SLACK = 1e-12
@@ -21,7 +21,7 @@ SLACK = 1e-12
 
 @dataclass(frozen=True)
 class Material:
-    """A refractive index with a name; two of the same index are equal, whatever they are called.
+    """Material: a complex refractive index with a name. Equal indices make equal materials.
 
     Parameters
     ----------
@@ -54,16 +54,16 @@ class Material:
 
     @property
     def dispersive(self) -> bool:
-        """Whether the index may change with the wavelength."""
+        """Whether the index may depend on the wavelength."""
         return any(
-            not (isinstance(curve, Formula) and curve.form == "constant")
+            not (isinstance(curve, IndexFormula) and curve.form == "constant")
             for curve in (self.n, self.kappa)
             if curve is not None
         )
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """First and last wavelength with an index, metres; None: any."""
+        """Wavelength range of the index, metres: first and last; None: any."""
         ranges = [
             curve.range for curve in (self.n, self.kappa) if curve is not None and curve.range is not None
         ]
@@ -72,7 +72,7 @@ class Material:
         return max(low for low, _ in ranges) * um, min(high for _, high in ranges) * um
 
     def index(self, wavelength: npt.ArrayLike) -> ComplexArray:
-        """Complex refractive index.
+        """Complex refractive index at wavelengths.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ def _in_um(limits: tuple[float, float] | None) -> tuple[float, float] | None:
 
 
 def constant(n: complex, name: str = "") -> Material:
-    """The same index at every wavelength.
+    """Material of the same index at every wavelength.
 
     Parameters
     ----------
@@ -138,9 +138,9 @@ def constant(n: complex, name: str = "") -> Material:
     value = complex(n)
     if not (np.isfinite(value) and value.real >= 0.0 and value.imag >= 0.0 and value != 0.0):
         raise ValueError(f"constant index {name}: expected n + i kappa with n, kappa >= 0, got {n!r}")
-    kappa = Formula("constant", (value.imag,)) if value.imag > 0.0 else None
+    kappa = IndexFormula("constant", (value.imag,)) if value.imag > 0.0 else None
     text = f"n={value.real:.6g}" + (f"+{value.imag:.6g}i" if kappa else "")
-    return Material(name or text, Formula("constant", (value.real,)), kappa)
+    return Material(name or text, IndexFormula("constant", (value.real,)), kappa)
 
 
 def cauchy(
@@ -150,7 +150,7 @@ def cauchy(
     range: tuple[float, float] | None = None,
     source: str = "",
 ) -> Material:
-    """Cauchy's n = a + b / w^2 + c / w^4 + ...
+    """Material by Cauchy's formula n = a + b / w^2 + c / w^4 + ...
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def cauchy(
     """
     powers = [(term * um ** -(2 * k + 2), -(2.0 * k + 2.0)) for k, term in enumerate(terms)]
     coefficients = (float(a), *(float(number) for pair in powers for number in pair))
-    return Material(name, Formula("formula 5", coefficients, _in_um(range)), source=source)
+    return Material(name, IndexFormula("formula 5", coefficients, _in_um(range)), source=source)
 
 
 def sellmeier(
@@ -181,7 +181,7 @@ def sellmeier(
     range: tuple[float, float] | None = None,
     source: str = "",
 ) -> Material:
-    """Sellmeier's n^2 = 1 + offset + sum of B w^2 / (w^2 - C).
+    """Material by Sellmeier's formula n^2 = 1 + offset + sum of B w^2 / (w^2 - C).
 
     Parameters
     ----------
@@ -214,7 +214,7 @@ def sellmeier(
         )
     form, scale = ("formula 1", um) if squares is None else ("formula 2", um**2)
     pairs = [float(number) for b, c in zip(strengths, given[0], strict=True) for number in (b, c / scale)]
-    return Material(name, Formula(form, (float(offset), *pairs), _in_um(range)), source=source)
+    return Material(name, IndexFormula(form, (float(offset), *pairs), _in_um(range)), source=source)
 
 
 def tabulated(
@@ -225,7 +225,7 @@ def tabulated(
     name: str = "table",
     source: str = "",
 ) -> Material:
-    """An index through measured points; n and kappa each run straight from one point to the next.
+    """Material by linear interpolation of measured n and kappa.
 
     Parameters
     ----------
@@ -249,12 +249,12 @@ def tabulated(
         return tuple(np.asarray(values, dtype=np.float64).tolist())
 
     w = numbers(np.asarray(wavelength, dtype=np.float64) / um)
-    absorption = None if kappa is None else Table(w, numbers(kappa))
-    return Material(name, Table(w, numbers(n)), absorption, source)
+    absorption = None if kappa is None else IndexTable(w, numbers(kappa))
+    return Material(name, IndexTable(w, numbers(n)), absorption, source)
 
 
 def absorbing(material: Material, strength: float, length: float) -> Material:
-    """A material with an absorption that falls off, kappa = strength exp(-w / length).
+    """Material with an exponential absorption, kappa = strength exp(-w / length).
 
     Parameters
     ----------
@@ -266,5 +266,5 @@ def absorbing(material: Material, strength: float, length: float) -> Material:
     -------
     Material
     """
-    kappa = Formula("exponential", (float(strength), length / um), material.n.range)
+    kappa = IndexFormula("exponential", (float(strength), length / um), material.n.range)
     return Material(material.name, material.n, kappa, material.source)

@@ -1,4 +1,4 @@
-"""Materials by name, from files, and by what stands for one.
+"""Named materials, and materials from files, numbers or names.
 
 Kinds: `constant`, `cauchy`, `sellmeier`, `tabulated`; with an absorption that falls off: `absorbing`.
 """
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fringetrace.core import nm, um
 from fringetrace.optics.materials import files
-from fringetrace.optics.materials.dispersion import Formula
+from fringetrace.optics.materials.dispersion import IndexFormula
 from fringetrace.optics.materials.material import Material, absorbing, cauchy, constant, sellmeier, tabulated
 
 __all__ = [
@@ -22,7 +22,7 @@ __all__ = [
 
 
 def load(path: str | Path, *, unit: str | None = None, name: str | None = None) -> Material:
-    """A material from a file.
+    """Load a material from a file.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def load(path: str | Path, *, unit: str | None = None, name: str | None = None) 
             raise ValueError(f"{file}: expected no unit (such pages are in micrometres), got {unit!r}")
         n, kappa, source = files.read_yaml(file)
     elif file.suffix.lower() in (".csv", ".txt"):
-        n, kappa, source = files.read_csv(file, unit)
+        n, kappa, source = files.read_index_csv(file, unit)
     else:
         raise ValueError(f"{file}: expected a .csv, .txt, .yml or .yaml file, got {file.suffix!r}")
     if n is None:
@@ -61,7 +61,7 @@ def load(path: str | Path, *, unit: str | None = None, name: str | None = None) 
 VACUUM = constant(1.0, "vacuum")
 AIR = Material(
     "air",
-    Formula("formula 6", (0.0, 0.05792105, 238.0185, 0.00167917, 57.362), (0.23, 1.69)),
+    IndexFormula("formula 6", (0.0, 0.05792105, 238.0185, 0.00167917, 57.362), (0.23, 1.69)),
     source="P. E. Ciddor, Appl. Opt. 35 (1996) 1566: dry, 15 C, 101325 Pa, 450 ppm CO2",
 )
 WATER = sellmeier(
@@ -95,22 +95,22 @@ FUSED_SILICA = sellmeier(
 _GHOSH = "G. Ghosh, Opt. Commun. 163 (1999) 95: room temperature"
 CALCITE_O = Material(
     "calcite o",
-    Formula("formula 2", (0.73358749, 0.96464345, 1.94325203e-2, 1.82831454, 120.0), (0.204, 2.172)),
+    IndexFormula("formula 2", (0.73358749, 0.96464345, 1.94325203e-2, 1.82831454, 120.0), (0.204, 2.172)),
     source=f"{_GHOSH}, ordinary",
 )
 CALCITE_E = Material(
     "calcite e",
-    Formula("formula 2", (0.35859695, 0.82427830, 1.06689543e-2, 0.14429128, 120.0), (0.204, 2.172)),
+    IndexFormula("formula 2", (0.35859695, 0.82427830, 1.06689543e-2, 0.14429128, 120.0), (0.204, 2.172)),
     source=f"{_GHOSH}, extraordinary",
 )
 QUARTZ_O = Material(
     "quartz o",
-    Formula("formula 2", (0.28604141, 1.07044083, 1.00585997e-2, 1.10202242, 100.0), (0.198, 2.0531)),
+    IndexFormula("formula 2", (0.28604141, 1.07044083, 1.00585997e-2, 1.10202242, 100.0), (0.198, 2.0531)),
     source=f"{_GHOSH}, ordinary",
 )
 QUARTZ_E = Material(
     "quartz e",
-    Formula("formula 2", (0.28851804, 1.09509924, 1.02101864e-2, 1.15662475, 100.0), (0.198, 2.0531)),
+    IndexFormula("formula 2", (0.28851804, 1.09509924, 1.02101864e-2, 1.15662475, 100.0), (0.198, 2.0531)),
     source=f"{_GHOSH}, extraordinary",
 )
 _VISIBLE = (400 * nm, 700 * nm)
@@ -156,7 +156,7 @@ def _plain(text: str) -> str:
 
 
 def named(text: str) -> Material:
-    """A material by its name; case, spaces and hyphens do not matter.
+    """Material by its name; case, spaces and hyphens do not matter.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def named(text: str) -> Material:
 
 
 def as_material(value: Material | complex | str, what: str = "material") -> Material:
-    """A material from what stands for one.
+    """Material from a material, a name or an index.
 
     Parameters
     ----------

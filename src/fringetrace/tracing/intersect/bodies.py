@@ -1,4 +1,4 @@
-"""Surfaces grouped into bodies, each with an Embree scene and a float64 tree of its own.
+"""Bodies: groups of surfaces, each with an Embree scene and a float64 tree of its own.
 
 A body is moved and scaled by a power of two into the unit box, so that a lattice of 65 nm rods inside
 a 0.3 m instrument keeps all the digits of float32. Nothing else knows Embree.
@@ -34,7 +34,7 @@ FACES, MANY = 16, 10000
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Bounding volume tree in float64: a complete binary tree over triangles."""
+    """Bounding volume tree in float64: a complete binary tree of triangles."""
 
     corners: FloatArray  # (t, 9)
     order: npt.NDArray[np.int32]  # (4 * leaves,), -1 where empty
@@ -44,7 +44,7 @@ class Tree:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """Triangles that share an Embree scene, in their unit box.
+    """Body: triangles that share an Embree scene, scaled into the unit box.
 
     `frame` holds centre (3, metres), scale (1/m, a power of two), and, in the unit box, the radius
     of the bounding sphere, the distance from an edge below which a restart is doubtful, and the
@@ -66,18 +66,18 @@ class Body:
 
     @property
     def stop(self) -> int:
-        """One past the number of its last triangle."""
+        """Number after the body's last triangle."""
         return self.first + len(self.faces)
 
     def prepare(self) -> None:
-        """Build both trees, once, before threads share them: bodies that no ray gets near have none."""
+        """Build both trees before threads share them; bodies that no ray comes near have none."""
         if "embree" not in vars(self):
             with self.lock:
                 _ = self.packed, self.embree
 
     @cached_property
     def embree(self) -> Any:
-        """The committed Embree scene."""
+        """Committed Embree scene."""
         from embreex.mesh_construction import TriangleMesh
         from embreex.rtcore_scene import EmbreeScene
 
@@ -89,12 +89,12 @@ class Body:
 
     @cached_property
     def tree(self) -> Tree:
-        """The float64 tree that decides doubtful hits."""
+        """Bounding volume tree in float64 that decides doubtful hits."""
         return _tree(self.vertices[self.faces], self.frame[6])
 
     @cached_property
     def packed(self) -> tuple[Any, ...]:
-        """The body as the kernels take it."""
+        """Body data in the form that the kernels read."""
         tree = (self.tree.corners, self.tree.order, self.tree.lower, self.tree.upper)
         return (
             self.first, self.stop, self.oriented, self.closed, self.frame, self.planes, self.gentle, tree
@@ -208,7 +208,7 @@ def _joined(meshes: Sequence[Mesh]) -> tuple[FloatArray, IntArray]:
 
 
 def unite(meshes: Sequence[Mesh], members: tuple[int, ...], first: int) -> Body:
-    """A body of some of a scene's meshes.
+    """Body of some of a scene's meshes.
 
     Parameters
     ----------
@@ -297,7 +297,7 @@ def _leaky(mesh: Mesh) -> bool:
 
 
 def group(meshes: Sequence[Mesh], alone: frozenset[int] = frozenset()) -> list[tuple[int, ...]]:
-    """Which meshes share a body: closed or flat ones of a size that stand clear of each other.
+    """Group meshes into bodies: closed or flat ones of similar size that do not touch share one.
 
     What touches or nests stays apart, so that thin gaps are between bodies, where float64 decides.
 
@@ -335,7 +335,7 @@ def group(meshes: Sequence[Mesh], alone: frozenset[int] = frozenset()) -> list[t
 def float32_hits(
     vertices: Float32, faces: IntArray
 ) -> Callable[[Float32, Float32], tuple[Array, Float32, Float32]]:
-    """Embree alone, all of it in float32: what others trace with, to compare with.
+    """Hits by Embree alone, in float32, for comparison.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Finds the hit: Embree says which triangle, float64 says where; the nearest over all bodies wins."""
+"""Nearest hit: Embree finds the triangle, float64 measures it, the nearest over all bodies wins."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fringetrace.tracing.intersect.bodies import Body, IntArray, group, unite
 
 @dataclass(frozen=True, eq=False)
 class Engine:
-    """Bodies of a scene, and whose each triangle is.
+    """Intersection engine: the bodies of a scene, and the surface of each triangle.
 
     `owner` (t,) is the surface of a triangle, `offset` (surfaces,) the number of its first one.
     """
@@ -27,18 +27,18 @@ class Engine:
 
     @property
     def base(self) -> int:
-        """Base of a path key, whose digits name surface and branch."""
+        """Base of path keys, whose digits name surface and branch."""
         return 2 * len(self.offset) + 1
 
     @cached_property
     def digit(self) -> Array:
-        """(t,) What a reflection off each triangle adds to a path key; small, to stay in the cache."""
+        """Path-key digit of a reflection at each triangle, (t,), in a small dtype."""
         return (2 * self.owner + 1).astype(np.min_scalar_type(self.base))
 
 
 @dataclass(frozen=True, eq=False)
 class Hits:
-    """What each row of a batch met last, and what Embree is asked (float32).
+    """Last hit of each row of a batch, and the queries to Embree (float32).
 
     `met` has the columns that `kernels` names: path (metres), point, normal, distance from the edge;
     `triangle` is -1 where nothing was met.
@@ -53,7 +53,7 @@ class Hits:
 
     @staticmethod
     def blank(rows: int) -> Hits:
-        """Room for so many rows."""
+        """Uninitialised table of so many rows."""
         return Hits(
             met=np.empty((rows, 8)),
             triangle=np.empty(rows, dtype=np.int64),
@@ -65,7 +65,7 @@ class Hits:
 
 
 def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
-    """The engine of a scene; built once and kept with the scene.
+    """Build the intersection engine of a scene, once; it is kept with the scene.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
 def aim(
     engine: Engine, batch: Batch, rows: int, hits: Hits, number: int, fresh: bool, cull: bool = True
 ) -> int:
-    """Float32 rays towards a body, into `hits`; returns how many of the batch can meet it."""
+    """Write float32 rays towards a body into `hits`; number of rays that can meet it."""
     from fringetrace.tracing.intersect import kernels
 
     body = engine.bodies[number]
@@ -136,7 +136,7 @@ def second_opinion(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.in
 
 
 def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:
-    """Nearest hit of each ray, written into `hits`.
+    """Find the nearest hit of each ray, into `hits`.
 
     Parameters
     ----------

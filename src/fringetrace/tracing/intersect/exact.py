@@ -1,4 +1,4 @@
-"""First hits in float64 alone: a bounding volume tree, and a watertight test, compiled by numba.
+"""Exact first hits in float64: bounding volume tree and watertight triangle test, compiled.
 
 What float32 leaves in doubt is decided here. `planes` has 16 numbers a triangle: its plane
 n.p + c = 0 with n unit, then three edge planes whose value is the distance inside each edge.
@@ -16,7 +16,7 @@ LEAF = 4
 
 @jit
 def select(order, keys, start, stop, middle):
-    """Reorder order[start:stop] so that the keys before `middle` are none larger than those after."""
+    """Quickselect: reorder order[start:stop] so that the keys before `middle` are the smallest."""
     low, high = start, stop - 1
     while low < high:
         pivot = keys[order[(low + high) // 2]]
@@ -40,7 +40,7 @@ def select(order, keys, start, stop, middle):
 
 @jit
 def arrange(middle, leaves):
-    """Order of triangles for a complete binary tree: halved across the longest extent of their centres.
+    """Triangle order of a complete binary tree: halved across the longest extent of the centres.
 
     `middle` is (3, t).
     """
@@ -71,7 +71,7 @@ def arrange(middle, leaves):
 
 @part
 def permute(x, y, z, axis):
-    """Coordinates with `axis` last (cyclic)."""
+    """Permute coordinates cyclically, `axis` last."""
     if axis == 0:
         return y, z, x
     if axis == 1:
@@ -81,7 +81,7 @@ def permute(x, y, z, axis):
 
 @jit
 def crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
-    """Whether a line goes through a triangle: watertight, shared edges decide alike on both sides.
+    """Watertight line-triangle test: both sides of a shared edge decide alike.
 
     Source: Woop, Benthin, Wald, J. Comput. Graph. Tech. 2 (2013) 65, in float64.
     """
@@ -111,7 +111,7 @@ def inset(planes, tri, x, y, z):
 
 @part
 def enters(lower, upper, node, x, y, z, ix, iy, iz, nearest):
-    """Path at which a ray enters a box, or infinity if it does not before `nearest`."""
+    """Path length at which a ray enters a box, or infinity if not before `nearest`."""
     if lower[node, 0] > upper[node, 0]:  # an empty one
         return np.inf
     ax, bx = (lower[node, 0] - x) * ix, (upper[node, 0] - x) * ix
@@ -125,7 +125,7 @@ def enters(lower, upper, node, x, y, z, ix, iy, iz, nearest):
 
 @part
 def inverse(component):
-    """1 / component, finite: a slab that a ray runs along is entered nowhere or everywhere."""
+    """Finite reciprocal of a direction component, for slab tests."""
     return 1.0 / component if abs(component) > 1e-200 else 1e200
 
 
@@ -133,7 +133,7 @@ def inverse(component):
 def decide(
     x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper, tolerance
 ):  # fmt: skip
-    """First hit of a ray in float64 alone, by a bounding volume tree; triangle -1 if none before `limit`.
+    """First hit of a ray in float64, by a bounding volume tree; triangle -1 if none before `limit`.
 
     `skip` is the triangle just left, `guess` one that is likely hit (or below 0). A face that
     the start touches is hit at 0 if the ray goes on through it: seen from the region it travels
@@ -201,7 +201,7 @@ def decide(
 
 @jit
 def first_hits(start, direction, skip, limit, planes, corners, order, lower, upper, tolerance):
-    """First hit of each ray beyond its start, in float64 alone: path and triangle, -1 if none before `limit`.
+    """First hits of rays in float64: path length and triangle, -1 if none before `limit`.
 
     `start` (n, 3), `limit` (n,) in the unit box; `skip` (n,) is a triangle to be passed over.
     """

@@ -1,4 +1,4 @@
-"""Compiled loops from rays to hits: what Embree is asked, when it is doubted, and what float64 makes of it.
+"""Compiled hit kernels: rays for Embree, doubt about its answers, measurement in float64.
 
 A body is a mesh moved and scaled by a power of two into the unit box; lengths in here are in
 that unit unless said otherwise. `planes` has 16 numbers a triangle: its plane n.p + c = 0 with
@@ -39,7 +39,7 @@ PATH, PX, PY, PZ, FX, FY, FZ, RIM = range(8)
 
 @part
 def restart(x, y, z, dx, dy, dz, nx, ny, nz, leaving, per):
-    """A point `SHIFT` above the face that a ray leaves at the cosine `leaving`, one over `per`.
+    """Start point `SHIFT` above the face that a ray leaves at the cosine `leaving`, one over `per`.
 
     Along the ray: aside, it would pass silhouettes on the wrong side. A grazing ray takes the
     rest along the normal.
@@ -57,7 +57,7 @@ def aim(
     total, state, last, frame, first, stop, owner, members, flat, lower, upper, cull, met, triangle, fresh,
     origin32, direction32, sent,
 ):  # fmt: skip
-    """Collect, in float32 and the unit box of a body, the rays that can meet it; return how many.
+    """Collect the rays that can meet a body, in float32 and its unit box; their number.
 
     `members` are the body's surfaces, in boxes `lower` to `upper`; from a `flat` one a ray does not
     come back to it. A ray that just left this body restarts `SHIFT` above its last triangle; one
@@ -112,7 +112,7 @@ def aim(
 
 @jit
 def suspect(sent, count, prim, state, last, body, origin32, leaving, asked):
-    """List the rays whose answer wants other opinions, of those that are just `leaving` the body or not.
+    """Rays whose hits need more queries, among those that are just `leaving` the body or not.
 
     Embree has holes at exact vertices, and float32 blurs the rim of an open body. Suspicious are
     misses of an open body, and, of rays that have not just left it, misses of a closed body from
@@ -142,7 +142,7 @@ def suspect(sent, count, prim, state, last, body, origin32, leaving, asked):
 
 @jit
 def beside(sent, asked, found, state, last, body, origin32, turn, moved, heading):
-    """Move suspicious rays `ASIDE`, across themselves, to the side `turn` (0, 1, 2: 120 degrees apart).
+    """Displace suspicious rays sideways by `ASIDE`, in direction `turn` (0, 1, 2: 120 degrees apart).
 
     Whichever way a rim runs, one of the three sides is well inside it. None goes through the face
     just left.
@@ -176,7 +176,7 @@ def beside(sent, asked, found, state, last, body, origin32, turn, moved, heading
 
 @jit
 def softly(planes, tri, x, y, z, folds, margin):
-    """Whether all edges of a triangle that a point is nearer to than `margin` have gentle folds (bits)."""
+    """Whether all edges of a triangle within `margin` of a point have gentle folds (bits)."""
     for k in range(3):
         e = 4 * k + 4
         height = planes[tri, e] * x + planes[tri, e + 1] * y + planes[tri, e + 2] * z + planes[tri, e + 3]
@@ -187,7 +187,7 @@ def softly(planes, tri, x, y, z, folds, margin):
 
 @part
 def crossing(planes, tri, x, y, z, dx, dy, dz):
-    """Where a ray crosses the plane of a triangle: its cosine to the normal, one over that, path, point, rim.
+    """Intersection of a ray with a triangle's plane: cosine, its reciprocal, path, point, edge distance.
 
     The rim is the distance of the point inside the nearest edge.
     """
@@ -201,7 +201,7 @@ def crossing(planes, tri, x, y, z, dx, dy, dz):
 
 @part
 def unsure(guess, again, path, facing, own, leaving, closed):
-    """Whether float32 does not decide, edges left aside; `again`: it names the triangle just left."""
+    """Whether float32 is in doubt, edges aside; `again`: it names the triangle just left."""
     if guess < 0:
         return (guess == -2) | (own & closed & (leaving < 0.0))
     measurable = (path > MARGIN) & (path < 1e300)
@@ -210,7 +210,7 @@ def unsure(guess, again, path, facing, own, leaving, closed):
 
 @jit
 def clamped(planes, tri, x, y, z):
-    """A point put back inside the edges of a triangle, and how far inside it was."""
+    """Point moved back inside the edges of a triangle, and how far inside it was."""
     rim = np.inf
     for k in range(4, 16, 4):
         ex, ey, ez = planes[tri, k], planes[tri, k + 1], planes[tri, k + 2]
@@ -223,7 +223,7 @@ def clamped(planes, tri, x, y, z):
 
 @jit
 def decided(ray, came, normal, left, leaving, guess, limit, body):
-    """Exact hit of a doubtful ray before `limit`: triangle, path, a point inside its edges, rim."""
+    """Exact hit of a doubtful ray before `limit`: triangle, path, a point inside its edges, edge distance."""
     _, _, oriented, closed, frame, planes, _, (corners, order, lower, upper) = body
     x, y, z, dx, dy, dz = ray
     bx, by, bz = came
@@ -259,7 +259,7 @@ def decided(ray, came, normal, left, leaving, guess, limit, body):
 
 @jit
 def reviewed(ray, came, normal, left, leaving, edge, guess, facing, hit, doubt, body):
-    """Second look at a hit in doubt or near an edge: whether float32 does not decide, triangle, hit.
+    """Review of a hit in doubt or near an edge: whether float32 is in doubt, triangle, hit.
 
     `left` is the triangle of this body that the ray just left, at the cosine `leaving` and `edge` away
     from its nearest edge; -1: one of another body, -2: none. `hit` is path, point and rim.
@@ -287,7 +287,7 @@ def reviewed(ray, came, normal, left, leaving, edge, guess, facing, hit, doubt, 
 
 @jit
 def measure(sent, count, prim, state, last, came, body, met, triangle):
-    """Turn Embree's triangle numbers into float64 hits; decide the doubtful ones exactly.
+    """Measure Embree's hits in float64; decide the doubtful ones exactly.
 
     Keeps a hit where it is nearer than the one in `met`. Returns how many were doubtful.
     """

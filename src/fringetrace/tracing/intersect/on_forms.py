@@ -1,4 +1,4 @@
-"""Between finding a hit and what happens there: hits on facets are moved onto the exact form behind them.
+"""Intersection with exact forms: hits on facets are moved onto the form behind them.
 
 Facets and form stand apart by the sag of the facets, so three things have to be told from true hits.
 A ray that has just left a form may cross facets before it is clear of them: such a crossing leads
@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray
-from fringetrace.geometry import Fit, LevelFit, Meeting, dot
+from fringetrace.core import Array, FloatArray, dot
+from fringetrace.geometry import Fit, LevelFit, Meeting
 from fringetrace.scene import Scene
 from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.intersect.bodies import Body
@@ -36,7 +36,7 @@ FLAT = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Formed:
-    """A surface with a form, alone in its body: the fit, and the longest side of its faces in metres."""
+    """Surface with a form, alone in its body: the fit, and the longest side of its faces in metres."""
 
     surface: int
     body: Body
@@ -45,7 +45,7 @@ class Formed:
 
 
 def formed(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
-    """The surfaces of a scene that have a form; fitted once and kept with the scene.
+    """Surfaces of a scene that have a form, fitted once and kept with the scene.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def find(
     hits: Hits,
     passed: frozenset[int] = frozenset(),
 ) -> int:
-    """Nearest hit of each ray, written into `hits`, those of surfaces with a form on it.
+    """Find the nearest hit of each ray, on the exact form where there is one, into `hits`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Pictures of BRDFs: heat maps over angles, polar lobes, spectrograms, and pages of them."""
+"""BRDF plots: heat maps over angles, polar lobes, spectrograms, overviews."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fringetrace.core import nm
-from fringetrace.views.plots.spectra import blank, edges, label, short, spectra, styles
+from fringetrace.views.plots.spectra import axis_label, cell_edges, new_axes, short, spectra, styles
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ def _bar(ax: Axes, drawn: Any, label: str, away: float = 0.03) -> None:
 def brdf(
     table: DataArray, ax: Axes | None = None, *, wavelength: float | None = None, title: str | None = None
 ) -> Axes:
-    """A BRDF in the plane of incidence: a heat map, the angle of the light upwards, of the eye to the right.
+    """Plot a BRDF in the plane of incidence: heat map of incident against outgoing angle.
 
     Parameters
     ----------
@@ -93,19 +93,19 @@ def brdf(
     """
     at, named = _at(table, wavelength)
     flat = _only(at, ("theta_i", "theta_o"))
-    up, right = (np.rad2deg(edges(flat[name], flat.sizes[name], str(name))) for name in flat.dims)
-    ax = blank(5.6, 4.4) if ax is None else ax
+    up, right = (np.rad2deg(cell_edges(flat[name], flat.sizes[name], str(name))) for name in flat.dims)
+    ax = new_axes(5.6, 4.4) if ax is None else ax
     drawn = ax.pcolormesh(right, up, np.asarray(flat), vmin=0.0, cmap="viridis")
     ax.set(xlabel=r"$\theta_o$ (to the eye) / °", ylabel=r"$\theta_i$ (to the light) / °", aspect="equal")
     ax.set_title(", ".join(filter(None, (title, named))))
-    _bar(ax, drawn, label(table))
+    _bar(ax, drawn, axis_label(table))
     return ax
 
 
 def polar(
     table: DataArray, ax: Axes | None = None, *, wavelength: float | None = None, title: str | None = None
 ) -> Axes:
-    """A BRDF on polar axes: curves in the plane of incidence, or a map of the hemisphere.
+    """Plot a BRDF on polar axes: lobes in the plane of incidence, or a map of the hemisphere.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def polar(
     """
     whole = table.sizes.get("phi_o", 1) > 1
     if ax is None:
-        ax = blank(5.6, 4.6, "polar") if whole else _half()
+        ax = new_axes(5.6, 4.6, "polar") if whole else _half()
     if ax.name != "polar":
         raise ValueError(f"axes: expected polar ones, as of subplots with projection='polar', got {ax.name}")
     at, named = _at(table, wavelength)
@@ -161,19 +161,23 @@ def _lobes(table: DataArray, ax: Any) -> None:
     at = np.arange(-90, 91, 30)
     ax.set_xticks(np.radians(at), labels=[f"{angle}°".replace("-", "−") for angle in at])
     ax.legend(
-        title=f"{label(table)}, light from", loc="upper center", bbox_to_anchor=(0.5, 0.2), ncols=4,
+        title=f"{axis_label(table)}, light from", loc="upper center", bbox_to_anchor=(0.5, 0.2), ncols=4,
         fontsize="small", frameon=False,
     )  # fmt: skip
 
 
 def _hemisphere(table: DataArray, ax: Any) -> None:
     flat = _only(table, ("theta_o", "phi_o"))
-    outwards = edges(flat["theta_o"], flat.sizes["theta_o"], "theta_o")
+    outwards = cell_edges(flat["theta_o"], flat.sizes["theta_o"], "theta_o")
     if float(flat["theta_o"][0]) < 0.0:
         raise ValueError("theta_o: expected angles from 0 up beside several phi_o, got negative ones")
     rings = np.rad2deg(np.clip(outwards, 0.0, 0.5 * np.pi))
     drawn = ax.pcolormesh(
-        edges(flat["phi_o"], flat.sizes["phi_o"], "phi_o"), rings, np.asarray(flat), vmin=0.0, cmap="viridis"
+        cell_edges(flat["phi_o"], flat.sizes["phi_o"], "phi_o"),
+        rings,
+        np.asarray(flat),
+        vmin=0.0,
+        cmap="viridis",
     )
     ax.grid(alpha=0.3)
     ax.set_ylim(0.0, 90.0)
@@ -184,13 +188,13 @@ def _hemisphere(table: DataArray, ax: Any) -> None:
         turn, np.rad2deg(abs(start[0])), "o", color="white", markeredgecolor="black", label="light from here"
     )
     ax.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.12), fontsize="small", frameon=False)
-    _bar(ax, drawn, label(table), 0.14)
+    _bar(ax, drawn, axis_label(table), 0.14)
 
 
 def spectrogram(
     table: DataArray, ax: Axes | None = None, *, top: float | None = None, title: str | None = None
 ) -> Axes:
-    """A BRDF from one direction against wavelength and angle of observation: a heat map.
+    """Plot a BRDF of one incidence over wavelength and outgoing angle.
 
     Parameters
     ----------
@@ -211,12 +215,12 @@ def spectrogram(
         If another axis has several values.
     """
     flat = _only(table, ("theta_o", "wavelength"))
-    ax = blank() if ax is None else ax
+    ax = new_axes() if ax is None else ax
     drawn = _spectrogram(flat, ax, _top(flat) if top is None else top)
     ax.set(xlabel="wavelength / nm", ylabel="observed at / °")
     if title:
         ax.set_title(title)
-    _bar(ax, drawn, label(table))
+    _bar(ax, drawn, axis_label(table))
     return ax
 
 
@@ -243,7 +247,7 @@ def _incidences(table: DataArray, observed: tuple[str, ...]) -> list[tuple[str, 
 
 
 def overview(table: DataArray, columns: int = 4) -> Figure:
-    """A spectrogram for each incidence, and each parameter of a study, to one scale.
+    """Plot one spectrogram per incidence and parameter of a study, to one scale.
 
     Parameters
     ----------
@@ -263,12 +267,12 @@ def overview(table: DataArray, columns: int = 4) -> Figure:
         ax.set_title(title, fontsize="small")
     figure.supxlabel("wavelength / nm")
     figure.supylabel("observed at / °")
-    figure.colorbar(drawn, ax=panels, label=label(table))
+    figure.colorbar(drawn, ax=panels, label=axis_label(table))
     return figure
 
 
 def mirror_spectra(table: DataArray, measured: DataArray | None = None, columns: int = 4) -> Figure:
-    """Spectra towards the mirror's direction, or the nearest observed: a panel for each incidence.
+    """Plot spectra in the specular direction, or the nearest observed: one panel per incidence.
 
     Parameters
     ----------

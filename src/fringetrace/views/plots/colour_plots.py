@@ -1,4 +1,4 @@
-"""Pictures of colour: swatches, strips, maps over angles, spheres, spectra with measured ones laid over."""
+"""Colour plots: swatches, strips, maps over angles, spheres, spectra."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fringetrace.core import FloatArray, nm
 from fringetrace.scattering import colour as spectra
-from fringetrace.views.plots.spectra import STYLES, blank, edges, lay_over, rainbow
+from fringetrace.views.plots.spectra import STYLES, cell_edges, lay_over, new_axes, rainbow
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -32,7 +32,7 @@ def _colours(xyz: npt.ArrayLike, dimensions: int, gamut: str) -> FloatArray:
 def swatches(
     xyz: npt.ArrayLike, labels: Sequence[str], ax: Axes | None = None, *, gamut: str = "clip"
 ) -> Axes:
-    """Squares of colour side by side, each with its name below.
+    """Plot colour swatches side by side, each with its name below.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def swatches(
     colours = _colours(xyz, 2, gamut)
     if len(labels) != len(colours):
         raise ValueError(f"labels: expected {len(colours)}, one a colour, got {len(labels)}")
-    ax = blank(max(2.0, 1.1 * len(colours)), 1.6) if ax is None else ax
+    ax = new_axes(max(2.0, 1.1 * len(colours)), 1.6) if ax is None else ax
     ax.imshow(colours[None], extent=(0.0, len(colours), 0.0, 1.0), interpolation="nearest")
     ax.set_xticks(np.arange(len(colours)) + 0.5, list(labels))
     ax.set_yticks([])
@@ -67,7 +67,7 @@ def swatches(
 def strip(
     xyz: npt.ArrayLike, places: npt.ArrayLike, ax: Axes | None = None, *, label: str = "", gamut: str = "clip"
 ) -> Axes:
-    """A strip of colour along an axis of thickness, angle or path.
+    """Plot a strip of colour along an axis of thickness, angle or path.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def strip(
         If shapes do not agree.
     """
     colours = _colours(xyz, 2, gamut)
-    sides = edges(places, len(colours), "places")
-    ax = blank(7.0, 1.3) if ax is None else ax
+    sides = cell_edges(places, len(colours), "places")
+    ax = new_axes(7.0, 1.3) if ax is None else ax
     ax.pcolormesh(sides, [0.0, 1.0], colours[None])
     ax.set(xlabel=label, yticks=[])
     return ax
@@ -104,7 +104,7 @@ def angles(
     *,
     gamut: str = "clip",
 ) -> Axes:
-    """Colours against the angles of light and eye.
+    """Plot colours over the angles of light and eye.
 
     Parameters
     ----------
@@ -125,18 +125,18 @@ def angles(
         If shapes do not agree.
     """
     colours = _colours(xyz, 3, gamut)
-    up = np.degrees(edges(theta_i, colours.shape[0], "theta_i"))
-    right = np.degrees(edges(theta_o, colours.shape[1], "theta_o"))
-    ax = blank(5.0, 4.4) if ax is None else ax
+    up = np.degrees(cell_edges(theta_i, colours.shape[0], "theta_i"))
+    right = np.degrees(cell_edges(theta_o, colours.shape[1], "theta_o"))
+    ax = new_axes(5.0, 4.4) if ax is None else ax
     ax.pcolormesh(right, up, colours)
     ax.set(xlabel=r"$\theta_o$ (to the eye) / °", ylabel=r"$\theta_i$ (to the light) / °", aspect="equal")
     return ax
 
 
-def sphere(
+def draw_sphere(
     xyz: npt.ArrayLike, ax: Axes | None = None, *, title: str | None = None, gamut: str = "clip"
 ) -> Axes:
-    """A picture of a sphere, as of `bsdf.sphere` or `mirrored`, on dark grey.
+    """Plot a sphere in colour, see `bsdf_tables.shaded_sphere` and `mirrored`, on dark grey.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def sphere(
     values = np.asarray(xyz, dtype=np.float64)
     colours = _colours(np.nan_to_num(values), 3, gamut)
     colours[np.isnan(values).any(axis=-1)] = BEHIND
-    ax = blank(3.4, 3.6) if ax is None else ax
+    ax = new_axes(3.4, 3.6) if ax is None else ax
     ax.imshow(colours, origin="lower", interpolation="nearest")
     ax.set_axis_off()
     if title:
@@ -162,7 +162,7 @@ def sphere(
 
 
 def mirrored(xyz: npt.ArrayLike, theta: npt.ArrayLike, pixels: int = 256) -> FloatArray:
-    """A shining sphere under a white sky all around: every place shows its colour at its own angle.
+    """Sphere that reflects a uniform white sky: each place has the colour of its own angle.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def mirrored(xyz: npt.ArrayLike, theta: npt.ArrayLike, pixels: int = 256) -> Flo
     return np.where(radius[..., None] < 1.0, picture, np.nan)
 
 
-def spectrum(
+def coloured_spectra(
     reflectance: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
     ax: Axes | None = None,
@@ -194,7 +194,7 @@ def spectrum(
     labels: Sequence[str] = (),
     measured: DataArray | None = None,
 ) -> Axes:
-    """Spectra over the colours of their wavelengths, with measured ones as dashed lines.
+    """Plot spectra over the colours of their wavelengths, with measured ones as dashed lines.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def spectrum(
             f"spectra: expected as many values as the {at.size} wavelengths and as many labels as spectra, "
             f"got shape {values.shape} and {len(labels)} labels"
         )
-    ax = blank(7.0, 4.0) if ax is None else ax
+    ax = new_axes(7.0, 4.0) if ax is None else ax
     for row, curve in enumerate(values):
         colour = STYLES[(row + 3) % len(STYLES)][0]
         ax.plot(at / nm, curve, color=colour, label=labels[row] if labels else None)

@@ -1,4 +1,4 @@
-"""Pictures with real units: interferograms, heights, residuals, phases; scenes come from `drawing`."""
+"""Image plots with real units: interferograms, heights, residuals, phases."""
 
 from __future__ import annotations
 
@@ -7,38 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, checked_wavelength, unit_of, whole
-from fringetrace.views.plots.brdf import brdf, mirror_spectra, overview, polar, spectrogram
-from fringetrace.views.plots.spectra import comparison, spectra, work_precision
-from fringetrace.views.scene3d.describe import itinerary
-from fringetrace.views.scene3d.subprocess import opengl
-from fringetrace.views.scene3d.viewer import export, page, picture, show
+from fringetrace.core import Array, FloatArray, checked_wavelength, filled, unit_of, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes as Axes
     from matplotlib.figure import Figure
-
-__all__ = [
-    "brdf",
-    "comparison",
-    "export",
-    "height",
-    "interferogram",
-    "itinerary",
-    "mirror_spectra",
-    "opengl",
-    "overview",
-    "page",
-    "phase",
-    "picture",
-    "polar",
-    "residual",
-    "save",
-    "show",
-    "spectra",
-    "spectrogram",
-    "work_precision",
-]
 
 NO_LIGHT = "#D0D0D0"
 
@@ -56,8 +29,8 @@ def _axes(ax: Axes | None, shape: tuple[int, ...]) -> Axes:
     return axes
 
 
-def pair() -> tuple[Axes, Axes]:
-    """Two axes side by side in a figure of their own, with room for a colour bar beside each.
+def side_by_side() -> tuple[Axes, Axes]:
+    """Two axes side by side in a new figure, with space for colour bars.
 
     Returns
     -------
@@ -89,7 +62,7 @@ def _image(
     values: Array, pitch: float, ax: Axes | None, *, label: str, title: str | None, style: dict[str, Any]
 ) -> Axes:
     """An array [row, column] = [y, x], with its axes, scale bar and colour bar."""
-    values = np.asarray(values)
+    values = filled(values)
     if values.ndim != 2 or values.size == 0:
         raise ValueError(f"image: expected shape (rows, columns), got {values.shape}")
     if not (np.isfinite(pitch) and pitch > 0.0):
@@ -118,7 +91,7 @@ def interferogram(
     wavelength: float | None = None,
     title: str | None = None,
 ) -> Axes:
-    """An interferogram in grey.
+    """Plot an interferogram in grey, with scale bar and colour bar.
 
     Parameters
     ----------
@@ -155,7 +128,7 @@ def interferogram(
 
 
 def height(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str | None = None) -> Axes:
-    """A height map, in nm, µm or mm; NaN is light grey.
+    """Plot a height map in nm, um or mm; NaN is light grey.
 
     Parameters
     ----------
@@ -168,6 +141,7 @@ def height(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str 
     -------
     matplotlib Axes
     """
+    map = filled(map)
     span = np.nanmax(np.abs(map)) if np.isfinite(map).any() else 0.0
     unit, metres = unit_of(float(span))
     return _image(map / metres, pitch, ax, label=f"height / {unit}", title=title, style={"cmap": "viridis"})
@@ -181,7 +155,7 @@ def residual(
     wavelength: float | None = None,
     title: str | None = None,
 ) -> Axes:
-    """A difference of heights, its scale the same on both sides of 0; its rms in the title.
+    """Plot a height residual, symmetric about 0, with its rms in the title.
 
     Parameters
     ----------
@@ -197,6 +171,7 @@ def residual(
     matplotlib Axes
         The scale ends at the 99.9th percentile, so that single pixels do not hide the rest.
     """
+    map = filled(map)
     valid = map[np.isfinite(map)]
     rms = float(np.sqrt(np.mean(valid**2))) if valid.size else 0.0
     top = float(np.quantile(np.abs(valid), 0.999)) if valid.size else 0.0
@@ -212,7 +187,7 @@ def residual(
 
 
 def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str | None = None) -> Axes:
-    """A wrapped phase in cyclic colours, which meet at -pi and pi.
+    """Plot a wrapped phase in a cyclic colour map.
 
     Parameters
     ----------
@@ -234,7 +209,7 @@ def phase(map: FloatArray, pitch: float, ax: Axes | None = None, *, title: str |
 
 
 def save(drawn: Axes | Figure, path: str | os.PathLike[str], dpi: float = 150.0) -> None:
-    """Write a figure, or the figure of some axes; a file is there in full or not at all.
+    """Save a figure, or the figure of some axes, atomically.
 
     Parameters
     ----------

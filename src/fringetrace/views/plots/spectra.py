@@ -1,4 +1,4 @@
-"""Pictures of curves: spectra over the colours of their wavelengths, run time against error."""
+"""Plots of spectra over the colours of their wavelengths, and of run time against error."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ Curves = Mapping[str, FloatArray]
 Panels = Mapping[str, Curves]
 
 
-def blank(width: float = 7.0, height: float = 4.0, projection: str | None = None) -> Axes:
-    """Axes in a figure of their own.
+def new_axes(width: float = 7.0, height: float = 4.0, projection: str | None = None) -> Axes:
+    """Axes in a new figure.
 
     Parameters
     ----------
@@ -55,7 +55,7 @@ def blank(width: float = 7.0, height: float = 4.0, projection: str | None = None
 
 
 def short(name: str, value: Any) -> str:
-    """A coordinate for a title or legend: angles in degrees, small lengths in nm.
+    """Short text of a coordinate for titles and legends: degrees, nm.
 
     Parameters
     ----------
@@ -75,8 +75,8 @@ def short(name: str, value: Any) -> str:
     return f"{name} {number / nm:g} nm" if 0.0 < number < 1e-3 else f"{name} {number:g}"
 
 
-def label(table: DataArray) -> str:
-    """Name and unit of a table's values, for an axis or a colour bar.
+def axis_label(table: DataArray) -> str:
+    """Axis label of a table's values: name and unit.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def label(table: DataArray) -> str:
 
 
 def styles(count: int, what: str) -> list[tuple[str, str, str]]:
-    """Colour, mark and line for a few curves.
+    """Colours, markers and line styles for a few curves.
 
     Parameters
     ----------
@@ -117,8 +117,8 @@ def styles(count: int, what: str) -> list[tuple[str, str, str]]:
     return [STYLES[which] for which in STRONG[:count]]
 
 
-def edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
-    """Sides of cells: halfway between neighbouring places, and as far beyond the last.
+def cell_edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
+    """Cell edges: midpoints between neighbouring places, extended at both ends.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def edges(places: npt.ArrayLike, count: int, what: str) -> FloatArray:
 
 
 def rainbow(ax: Axes) -> None:
-    """The colours of the wavelengths in a strip along the bottom of axes, over nm.
+    """Draw the colours of the wavelengths in a strip along the bottom of axes in nm.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def rainbow(ax: Axes) -> None:
 
 
 def lay_over(ax: Axes, measured: DataArray, scale: float = 1.0, note: str = "") -> None:
-    """Measured spectra as black broken lines over others.
+    """Draw measured spectra over others, as dashed black lines.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def lay_over(ax: Axes, measured: DataArray, scale: float = 1.0, note: str = "") 
 def spectra(
     table: DataArray, ax: Axes | None = None, *, measured: DataArray | None = None, title: str | None = None
 ) -> Axes:
-    """Spectra over the colours of their wavelengths, with measured ones laid over as black broken lines.
+    """Plot spectra over the colours of their wavelengths, with measured ones as dashed black lines.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def spectra(
     flat = table.transpose(*others, "wavelength")
     varied = [name for name in others if table.sizes[name] > 1]
     rows = np.asarray(flat).reshape(-1, table.sizes["wavelength"])
-    ax = blank() if ax is None else ax
+    ax = new_axes() if ax is None else ax
     at, alone = np.asarray(table["wavelength"]) / nm, None if measured is None else "model"
     places = np.ndindex(*(table.sizes[name] for name in others))
     for values, place, (colour, _, line) in zip(rows, places, styles(len(rows), "spectra"), strict=True):
@@ -223,7 +223,7 @@ def spectra(
     if measured is not None:
         lambertian = table.attrs.get("units") in PER_STERADIAN
         lay_over(ax, measured, *((1.0 / np.pi, " / π") if lambertian else ()))
-    ax.set(xlabel="wavelength / nm", ylabel=label(table), xlim=(at.min(), at.max()))
+    ax.set(xlabel="wavelength / nm", ylabel=axis_label(table), xlim=(at.min(), at.max()))
     if title:
         ax.set_title(title)
     ax.autoscale(axis="y")  # again, for axes that share their scale
@@ -244,7 +244,7 @@ def work_precision(
     legend: bool = True,
     title: str | None = None,
 ) -> Axes:
-    """Error against seconds or rays, logarithmic.
+    """Plot error against seconds or rays, logarithmic.
 
     Parameters
     ----------
@@ -271,7 +271,7 @@ def work_precision(
         raise ValueError("work_precision: expected at least one curve, got none")
     if against not in ("seconds", "rays"):
         raise ValueError(f"against: expected seconds or rays, got {against!r}")
-    ax = blank() if ax is None else ax
+    ax = new_axes() if ax is None else ax
     names = list(order or curves)
     for name, (rays, seconds, error) in curves.items():
         colour, mark, line = STYLES[names.index(name) % len(STYLES)]
@@ -287,7 +287,7 @@ def work_precision(
 
 
 def comparison(panels: Panels) -> Figure:
-    """Error against seconds and against rays, a pair of axes for each panel, to one scale.
+    """Plot error against seconds and against rays, two axes per panel, to one scale.
 
     Parameters
     ----------

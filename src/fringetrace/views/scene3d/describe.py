@@ -1,4 +1,4 @@
-"""A path in words: what it met, how long it was, and with which phase it ends."""
+"""Description of one path in words: surfaces, lengths, phase and power."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ ENDS = {
 NOTHING = 1e-12
 
 
-def itinerary(paths: Paths, row: int, wavelength: float | None = None) -> str:
-    """One path in words: places, surfaces met, lengths, phase and power.
+def describe_path(paths: Paths, row: int, wavelength: float | None = None) -> str:
+    """Describe one path in words: places, surfaces, lengths, phase and power.
 
     Parameters
     ----------
@@ -42,11 +42,11 @@ def itinerary(paths: Paths, row: int, wavelength: float | None = None) -> str:
     """
     if not -len(paths) <= row < len(paths):
         raise IndexError(f"itinerary row: expected one of {len(paths)} paths, got {row}")
-    return told(strands(paths.where(np.array([row])), wavelength, every=True), 0)
+    return describe_polyline(strands(paths.where(np.array([row])), wavelength, every=True), 0)
 
 
-def told(shown: Strands, number: int, wavelength: int | None = None, step: float = 0.0) -> str:
-    """One of the strands in words.
+def describe_polyline(shown: Strands, number: int, wavelength: int | None = None, step: float = 0.0) -> str:
+    """Describe one of the sampled paths in words.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Surfaces and rays in the files of other programs: glTF, PLY, VTP."""
+"""Export of surfaces and rays to glTF, PLY and VTP."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ THIN, SIDES = 1e-3, 6
 UPRIGHT = np.array([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 
 
-def export(view: View, path: str | os.PathLike[str]) -> None:
-    """Write a view's surfaces and rays; the file is there in full or not at all. Lengths in metres.
+def write_view(view: View, path: str | os.PathLike[str]) -> None:
+    """Export a view's surfaces and rays, in metres; the file is written atomically.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def export(view: View, path: str | os.PathLike[str]) -> None:
 
 
 def polydata(view: View) -> PolyData:
-    """Rays as polylines, then surfaces as triangles, with all numbers.
+    """PyVista data of rays as polylines and surfaces as triangles, with all attributes.
 
     Parameters
     ----------

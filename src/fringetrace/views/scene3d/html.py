@@ -1,4 +1,4 @@
-"""A scene as one HTML file that needs neither network nor server: to turn, to re-phase, to click on rays."""
+"""HTML page of a scene: one file without network, to rotate, re-phase and inspect rays."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import FloatArray
-from fringetrace.views.scene3d.describe import told
-from fringetrace.views.scene3d.layout import Panel, Solid, apart, axes_of_view, exploded
+from fringetrace.views.scene3d.describe import describe_polyline
+from fringetrace.views.scene3d.layout import Panel, Solid, apart, axes_of_view, explode
 from fringetrace.views.scene3d.palette import WAYS, Scale, scale, values
 from fringetrace.views.scene3d.polylines import Strands
 from fringetrace.views.scene3d.vtk import View, chip, surface
@@ -29,8 +29,8 @@ STEPS = 12
 GREYS = [[0.0, "#000000"], [1.0, "#ffffff"]]
 
 
-def page(view: View, path: str | os.PathLike[str], title: str = "fringetrace") -> None:
-    """Write a page; the file is there in full or not at all.
+def write_page(view: View, path: str | os.PathLike[str], title: str = "fringetrace") -> None:
+    """Write the HTML page of a scene, atomically.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ def page(view: View, path: str | os.PathLike[str], title: str = "fringetrace") -
     ImportError
         If plotly is missing; says what to install.
     """
-    text = composed(view, title)
+    text = page_text(view, title)
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix=".fringetrace-", dir=target.parent) as folder:
         part = Path(folder, "page.html")
@@ -51,8 +51,8 @@ def page(view: View, path: str | os.PathLike[str], title: str = "fringetrace") -
         os.replace(part, target)
 
 
-def composed(view: View, title: str) -> str:
-    """The text of a page.
+def page_text(view: View, title: str) -> str:
+    """Text of the HTML page.
 
     Parameters
     ----------
@@ -75,12 +75,12 @@ def composed(view: View, title: str) -> str:
         "plotly": get_plotlyjs(),
         "data": json.dumps(data, allow_nan=False).replace("</", "<\\/"),
     }
-    template = files("fringetrace").joinpath("page.html").read_text(encoding="utf-8")
+    template = files("fringetrace.views.scene3d").joinpath("page.html").read_text(encoding="utf-8")
     return Template(template).substitute(parts)
 
 
 def contents(view: View) -> dict[str, Any]:
-    """All that a page shows, as it goes into JSON.
+    """Contents of the HTML page, as they go into JSON.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _lines() -> list[dict[str, Any]]:
 def _rays(view: View, shown: Strands, trace: int, steps: int) -> dict[str, Any]:
     """Legs with all that they may be coloured by, and every path in words."""
     stage, (path, bounce) = view.stage, shown.legs()
-    straight = np.stack(exploded(shown, np.zeros(3)), axis=1) / stage.metres
+    straight = np.stack(explode(shown, np.zeros(3)), axis=1) / stage.metres
     most = int(bounce.max())
     ways = {way: _way(view, shown, way) for way in WAYS if way != "phase" or len(shown.wavelengths)}
     ends = np.zeros(len(shown), dtype=int)
@@ -214,7 +214,7 @@ def _rays(view: View, shown: Strands, trace: int, steps: int) -> dict[str, Any]:
         "shift": _shift(view, shown), "explode": 20 if view.shift.any() else 0,
         "step": round(view.step * steps / (2.0 * np.pi)) % steps, "colour": view.colour, "ways": ways,
         "wavelengths": shown.wavelengths.tolist(), "chosen": shown.chosen, "phase": None,
-        "texts": [told(shown, number) for number in range(len(shown))],
+        "texts": [describe_polyline(shown, number) for number in range(len(shown))],
     }  # fmt: skip
     if len(shown.wavelengths):
         turns = shown.phase[:, path, bounce + 1]

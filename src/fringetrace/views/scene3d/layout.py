@@ -1,4 +1,4 @@
-"""What of a scene is to be seen, as plain arrays: they go to another process, or onto a page."""
+"""Layout of a 3D view as plain arrays: surfaces, sources, CCD, labels, scale bar."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ THICK = np.array([-0.01, -0.01, 0.01, 0.01])  # room around an arrow, likewise
 
 @dataclass(frozen=True, eq=False)
 class Solid:
-    """A surface as it looks.
+    """Surface of a view, with its appearance.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Solid:
 
 @dataclass(frozen=True, eq=False)
 class Panel:
-    """A rectangle: that of a beam, or a CCD.
+    """Rectangle of a view: a beam or a CCD.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Panel:
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """A source's direction.
+    """Arrow of a view: direction of a source.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class Arrow:
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """A scene to be looked at.
+    """Contents of a 3D view besides the rays.
 
     Attributes
     ----------
@@ -109,12 +109,12 @@ class Stage:
 
     @property
     def places(self) -> list[tuple[str, FloatArray]]:
-        """Names of all things, and points of these."""
+        """Names of all objects, and points on them."""
         solids = [(solid.name, solid.vertices) for solid in self.solids]
         return [*solids, *((panel.name, panel.corners) for panel in self.panels)]
 
 
-def extent(scene: Scene) -> float:
+def scene_size(scene: Scene) -> float:
     """Largest side of the box around the surfaces of a scene.
 
     Parameters
@@ -129,7 +129,7 @@ def extent(scene: Scene) -> float:
     return float(np.ptp(bounds.reshape(-1, 3), axis=0).max())
 
 
-def staged(
+def lay_out(
     scene: Scene,
     parts: Sequence[Paths] = (),
     shown: Strands | None = None,
@@ -138,7 +138,7 @@ def staged(
     surfaces: str = "interface",
     relief: str | None = None,
 ) -> Stage:
-    """A scene, its sources and its CCD.
+    """Layout of a scene, its sources and its CCD.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def staged(
     ValueError
         For an unknown surface or way of colouring, an image without a CCD.
     """
-    size = extent(scene)
+    size = scene_size(scene)
     solids, legend = _solids(scene, surfaces, relief)
     panels, arrows = _ends(parts, shown, size, image)
     corners = np.concatenate([solid.vertices for solid in solids] + [panel.corners for panel in panels])
@@ -216,7 +216,7 @@ def _ends(
 
 
 def checked_image(image: Any, ccd: CCD) -> FloatArray:
-    """The image itself, once it is known to be one of a CCD.
+    """Checked image of a CCD.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def _rectangle(of: Beam | CCD) -> FloatArray:
 
 
 def axes_of_view() -> tuple[FloatArray, FloatArray, FloatArray]:
-    """To the right, up and towards the eye, in the view that pictures begin with.
+    """Axes of the initial view: to the right, up and towards the eye.
 
     Returns
     -------
@@ -271,7 +271,7 @@ def _bar(points: FloatArray) -> tuple[FloatArray, str]:
 
 
 def labels(stage: Stage) -> list[tuple[str, FloatArray, bool]]:
-    """Where the names of things stand: beside them, clear of each other and of other things as far as may be.
+    """Label positions beside objects, clear of each other and of other objects where possible.
 
     Parameters
     ----------
@@ -331,8 +331,8 @@ def _overlap(box: FloatArray, taken: Sequence[FloatArray]) -> float:
     return float(np.prod(np.maximum(sides, 0.0), axis=1).sum())
 
 
-def exploded(shown: Strands, shift: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Ends of legs, each moved the farther the more surfaces light has met.
+def explode(shown: Strands, shift: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Segment ends, each displaced in proportion to the surfaces met before.
 
     Parameters
     ----------
@@ -350,7 +350,7 @@ def exploded(shown: Strands, shift: npt.ArrayLike) -> tuple[FloatArray, FloatArr
 
 
 def apart(shown: Strands) -> FloatArray:
-    """A shift from bounce to bounce that parts legs well: along the least extent of the rays.
+    """Displacement per bounce that separates segments well: along the least extent of the rays.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Colours of rays and of surfaces: by what, over which scale; for any colour vision, and on white."""
+"""Colours of rays and surfaces, for any colour vision and a white background."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ SHADES = ("#8FB8DE", "#E3B58A", "#8CCBB0", "#E2B3CE", "#F0D48A", "#BBB6E3", "#C9
 
 @dataclass(frozen=True)
 class Scale:
-    """What colours stand for.
+    """Colour scale of rays.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Scale:
     names: tuple[str, ...] = ()
 
     def table(self, count: int = 256) -> npt.NDArray[np.uint8]:
-        """(count, 3): red, green, blue from the low end to the high one; of names one each."""
+        """Colours from the low to the high end (or one per name), (count, 3): red, green, blue."""
         anchors = np.array([[int(c[i : i + 2], 16) for i in (1, 3, 5)] for c in self.colours])
         if self.names:
             return anchors.astype(np.uint8)
@@ -72,8 +72,8 @@ class Scale:
         return np.round(np.stack(columns, axis=1)).astype(np.uint8)
 
 
-def checked(way: str, strands: Strands | None) -> str:
-    """The way of colouring itself, once it is known to be one, and possible.
+def checked_colouring(way: str, strands: Strands | None) -> str:
+    """Checked name of a colouring that is possible for the paths.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def checked(way: str, strands: Strands | None) -> str:
 
 
 def scale(strands: Strands, way: str, unit: str, metres: float) -> Scale:
-    """What the colours of rays stand for.
+    """Colour scale of the rays for a colouring.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def scale(strands: Strands, way: str, unit: str, metres: float) -> Scale:
 def values(
     strands: Strands, way: str, metres: float, *, wavelength: int | None = None, step: float = 0.0
 ) -> FloatArray:
-    """Numbers that are coloured, at the start and the end of each leg.
+    """Values to be coloured, at the start and the end of each segment.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def values(
 
 
 def look(surface: Surface) -> tuple[str, str, float]:
-    """What a surface looks like by what it does to light.
+    """Appearance of a surface by its interface.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Paths to be looked at: a sample of them, point by point, with optical path and phase at any wavelength."""
+"""Ray polylines to draw: a sample of paths with optical path and phase at each point."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ RANGE = 0.8, 1.25
 
 @dataclass(frozen=True, eq=False)
 class Strands:
-    """Paths point by point: m of them, k points each (start, hits, end), padded with NaN or -1.
+    """Ray polylines: m paths of k points each (start, hits, end), padded with NaN or -1.
 
     Attributes
     ----------
@@ -87,16 +87,16 @@ class Strands:
 
     @property
     def shown(self) -> int:
-        """Rays that are shown."""
+        """Numbers of the rays that are shown."""
         return len(np.unique(np.stack([self.beam, self.ray]), axis=1).T)
 
     @property
     def caption(self) -> str:
-        """How many rays there are, and how many of them are shown."""
+        """Caption: number of rays, and how many of them are shown."""
         return f"{self.shown:,} of {self.rays:,} rays" if self.shown < self.rays else f"{self.rays:,} rays"
 
     def legs(self) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-        """Path and bounce of every leg: it goes from start [path, bounce] to point [path, bounce + 1].
+        """Path and bounce of every segment, from start [path, bounce] to point [path, bounce + 1].
 
         Returns
         -------
@@ -116,7 +116,7 @@ def strands(
     sweep: int = 1,
     onward: float = 0.0,
 ) -> Strands:
-    """A sample of paths, as they are drawn.
+    """Ray polylines of a sample of paths.
 
     Parameters
     ----------
@@ -279,8 +279,8 @@ def _ended(paths: Paths, onward: float) -> tuple[FloatArray, FloatArray, tuple[A
         seen = np.flatnonzero(paths.fate == Fate.DETECTED)
         ccd, direction = paths.ccd, paths.direction[seen]
         last = points[seen, end[seen]]
-        back = ((ccd.centre - last) @ ccd.normal) / (direction @ ccd.normal)
-        points[seen, end[seen]] = last + back[:, None] * direction
+        back = ccd.focus / (direction @ ccd.axes[2])  # to the plane of focus, as it was
+        points[seen, end[seen]] = last - back[:, None] * direction
     left = np.flatnonzero(paths.fate == Fate.LEFT)
     beyond = left, end[left] + 1
     assert paths.starts is not None
@@ -314,7 +314,7 @@ def _padded(array: Array, axis: int, more: int, name: str) -> Array:
 
 
 def start_of(source: Any, points: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Where and to where light of a source starts, and how broad it is.
+    """Start, direction and width of the light of a source.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""VTK in a process of its own: without its libraries it crashes the one that it is in."""
+"""VTK in a separate process, which protects this one where OpenGL libraries are missing."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ TRIAL = "import pyvista; p = pyvista.Plotter(off_screen=True); p.add_mesh(pyvist
 
 
 def child(code: str, sent: Callable[[], bytes] = bytes, seconds: float | None = None) -> None:
-    """Draw in another process.
+    """Draw in a separate process.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def _render() -> None:
 
 
 def opengl() -> str | None:
-    """Whether 3D pictures can be made here, tried out in another process.
+    """Whether 3D pictures can be drawn here, tested in a separate process.
 
     Returns
     -------
@@ -81,7 +81,7 @@ def opengl() -> str | None:
 
 
 def written(view: Callable[[], View], path: str | os.PathLike[str], size: tuple[int, int]) -> None:
-    """A PNG of a view; the file is there in full or not at all.
+    """Write a PNG picture of a view, atomically.
 
     Parameters
     ----------
@@ -102,8 +102,8 @@ def written(view: Callable[[], View], path: str | os.PathLike[str], size: tuple[
         os.replace(part, target)
 
 
-def opened(view: View, size: tuple[int, int]) -> None:
-    """A window with a view; comes back once it is closed.
+def open_window(view: View, size: tuple[int, int]) -> None:
+    """Open a window with a view; returns once it is closed.
 
     Parameters
     ----------

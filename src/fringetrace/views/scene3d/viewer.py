@@ -1,4 +1,4 @@
-"""Scenes and benches to look at: a picture, a window, a page for a browser, files for other programs."""
+"""3D views of scenes and interferometers: picture, window, HTML page, export."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import FloatArray
-from fringetrace.instruments import Bench, Mark
+from fringetrace.instruments import Interferometer, Mark
 from fringetrace.scene import Scene
 from fringetrace.tracing import Paths
 from fringetrace.views.scene3d import formats, html
-from fringetrace.views.scene3d.layout import apart, extent, staged
-from fringetrace.views.scene3d.palette import checked
+from fringetrace.views.scene3d.layout import apart, lay_out, scene_size
+from fringetrace.views.scene3d.palette import checked_colouring
 from fringetrace.views.scene3d.polylines import Strands, strands
-from fringetrace.views.scene3d.subprocess import opened, written
+from fringetrace.views.scene3d.subprocess import open_window, written
 from fringetrace.views.scene3d.vtk import View
 
 Several = Paths | Sequence[Paths] | None
@@ -31,7 +31,7 @@ ONWARD = 0.3
 
 
 class Looks(TypedDict, total=False):
-    """How a scene is drawn; see `view`."""
+    """Drawing options of a scene; see `view`."""
 
     colour: str
     wavelength: float | None
@@ -49,7 +49,7 @@ class Looks(TypedDict, total=False):
 
 
 def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
-    """A grid of rays of the same proportions, few enough to look at.
+    """Coarser grid of rays of the same proportions, for drawing.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def few(shape: tuple[int, int], most: int = DRAWN) -> tuple[int, int]:
     return rows, columns
 
 
-def view(
-    scene: Scene | Bench,
+def scene_view(
+    scene: Scene | Interferometer,
     paths: Several = None,
     *,
     colour: str = "route",
@@ -84,11 +84,11 @@ def view(
     tubes: float = 0.0,
     sweep: int = 1,
 ) -> View:
-    """What is to be drawn, as plain arrays.
+    """View of a scene as plain arrays.
 
     Parameters
     ----------
-    scene : Scene or Bench
+    scene : Scene or Interferometer
         A bench brings its rays, its image (with a wavelength), and what a phase step turns.
     paths : Paths, or a sequence of them, optional
         Traced with record=True; of several beams. Those that reached the CCD are drawn; all, if none did.
@@ -132,10 +132,10 @@ def view(
     ValueError
         If the paths have no recorded points, a name or a way of colouring is unknown, the image does not fit.
     """
-    checked(colour, None)
-    if isinstance(scene, Bench):
+    checked_colouring(colour, None)
+    if isinstance(scene, Interferometer):
         paths = scene.sampled(few(scene.beam.shape), wavelength) if paths is None else paths
-        reference = (scene.mark or Mark(scene.reference)) if reference is None else reference
+        reference = scene.arms.reference if reference is None else reference
         if image is None and wavelength is not None and sweep == 1:
             image = scene.interferogram(wavelength, step=step)
         scene = scene.scene
@@ -145,10 +145,10 @@ def view(
         mark = Mark(scene.index(reference)) if isinstance(reference, str) else reference
         shown = strands(
             parts, wavelength, most=most, every=colour == "fate" if every is None else every, reference=mark,
-            sweep=sweep, onward=ONWARD * extent(scene),
+            sweep=sweep, onward=ONWARD * scene_size(scene),
         )  # fmt: skip
-        checked(colour, shown)
-    stage = staged(scene, parts, shown, image=image, surfaces=surfaces, relief=relief)
+        checked_colouring(colour, shown)
+    stage = lay_out(scene, parts, shown, image=image, surfaces=surfaces, relief=relief)
     plane = None if clip is None else tuple(np.asarray(part, dtype=np.float64) for part in clip)
     return View(stage, shown, colour, step, None, upto, _shift(explode, shown), tubes, plane)  # type: ignore[arg-type]
 
@@ -162,118 +162,118 @@ def _shift(explode: float | npt.ArrayLike, shown: Strands | None) -> FloatArray:
 
 
 def picture(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several | Callable[[], Several],
     path: str | os.PathLike[str],
     *,
     size: tuple[int, int] = (1600, 1000),
     **looks: Unpack[Looks],
 ) -> None:
-    """A PNG of a scene, drawn off-screen in a process of its own.
+    """Write a PNG picture of a scene, drawn off-screen in a separate process.
 
     Parameters
     ----------
-    scene : Scene or Bench
-    paths : as in `view`; or callable
+    scene : Scene or Interferometer
+    paths : as in `scene_view`; or callable
         A function that gives them is called while VTK is loaded.
     path : path
     size : (width, height), pixels
     **looks
-        Colours and the like, see `view`.
+        Colours and the like, see `scene_view`.
 
     Raises
     ------
     RuntimeError
         If there are no OpenGL libraries (says which packages to install), or VTK fails.
     ValueError
-        As `view`.
+        As `scene_view`.
     """
-    written(lambda: view(scene, paths() if callable(paths) else paths, **looks), path, size)
+    written(lambda: scene_view(scene, paths() if callable(paths) else paths, **looks), path, size)
 
 
 def show(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several = None,
     *,
     size: tuple[int, int] = (1600, 1000),
     **looks: Unpack[Looks],
 ) -> None:
-    """A window with a scene: to turn and zoom, with sliders, clipping, and rays to click on.
+    """Show a scene in a window, with sliders, a clipping plane and rays to click on.
 
     Parameters
     ----------
-    scene : Scene or Bench
-    paths : as in `view`
+    scene : Scene or Interferometer
+    paths : as in `scene_view`
     size : (width, height), pixels
     **looks
-        Colours and the like, see `view`.
+        Colours and the like, see `scene_view`.
 
     Raises
     ------
     RuntimeError
         As `picture`; if there is no display.
     ValueError
-        As `view`.
+        As `scene_view`.
     """
-    opened(_interactive(scene, paths, looks), size)
+    open_window(_interactive(scene, paths, looks), size)
 
 
 def page(
-    scene: Scene | Bench,
+    scene: Scene | Interferometer,
     paths: Several,
     path: str | os.PathLike[str],
     *,
     title: str = "fringetrace",
     **looks: Unpack[Looks],
 ) -> None:
-    """One HTML file with a scene to turn, to re-phase, to click on; it needs neither network nor server.
+    """Write an interactive HTML page of a scene: one file that needs neither network nor server.
 
     Parameters
     ----------
-    scene : Scene or Bench
-    paths : as in `view`
+    scene : Scene or Interferometer
+    paths : as in `scene_view`
     path : path
     title : str
     **looks
-        What it begins with, see `view`; clipping and tubes are for pictures and windows.
+        What it begins with, see `scene_view`; clipping and tubes are for pictures and windows.
 
     Raises
     ------
     ImportError
         If plotly is missing; says what to install.
     ValueError
-        As `view`.
+        As `scene_view`.
     """
-    html.page(_interactive(scene, paths, looks), path, title)
+    html.write_page(_interactive(scene, paths, looks), path, title)
 
 
 def export(
-    scene: Scene | Bench, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
+    scene: Scene | Interferometer, paths: Several, path: str | os.PathLike[str], **looks: Unpack[Looks]
 ) -> None:
-    """Surfaces and rays for other programs: .glb, .ply or .vtp, in metres.
+    """Export surfaces and rays as .glb, .ply or .vtp, in metres.
 
     Parameters
     ----------
-    scene : Scene or Bench
-    paths : as in `view`
+    scene : Scene or Interferometer
+    paths : as in `scene_view`
     path : path
-        Its suffix says the kind, see `exports.export`.
+        Its suffix says the kind, see `exports.write_view`.
     **looks
-        Colours and the like, see `view`.
+        Colours and the like, see `scene_view`.
 
     Raises
     ------
     ValueError
-        As `view`; for another suffix.
+        As `scene_view`; for another suffix.
     """
-    formats.export(view(scene, paths, **looks), path)
+    formats.write_view(scene_view(scene, paths, **looks), path)
 
 
-def _interactive(scene: Scene | Bench, paths: Several, looks: Looks) -> View:
+def _interactive(scene: Scene | Interferometer, paths: Several, looks: Looks) -> View:
     """A view with phases at many wavelengths, and of a bench with an image for each phase step."""
-    found = view(scene, paths, sweep=SWEEP, **looks)
+    found = scene_view(scene, paths, sweep=SWEEP, **looks)
     frames, wavelength = None, looks.get("wavelength")
-    if isinstance(scene, Bench) and looks.get("image") is None and wavelength is not None:
+    if isinstance(scene, Interferometer) and looks.get("image") is None and wavelength is not None:
         frames = _binned(scene.phase_steps(wavelength, STEPS))
     panels = [
         panel if panel.name != "CCD" else replace(panel, image=_shown(panel.image, frames))

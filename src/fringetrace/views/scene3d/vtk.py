@@ -1,4 +1,4 @@
-"""Scenes in space drawn by VTK: surfaces, rays, sources and CCD, with axes, legends and a scale bar."""
+"""3D drawing by VTK: surfaces, rays, sources and CCD, with axes, legends and a scale bar."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fringetrace.views.scene3d.layout import (
     Solid,
     Stage,
     axes_of_view,
-    exploded,
+    explode,
     labels,
 )
 from fringetrace.views.scene3d.palette import scale, values
@@ -43,7 +43,7 @@ BELOW = 0.02
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """What is drawn, and how.
+    """View to draw: contents and drawing options.
 
     Parameters
     ----------
@@ -79,8 +79,8 @@ class View:
     frames: FloatArray | None = None
 
 
-def legs(view: View) -> PolyData:
-    """Legs of rays as lines, two points each.
+def path_lines(view: View) -> PolyData:
+    """Ray segments as line data, two points each.
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def legs(view: View) -> PolyData:
     metres = view.stage.metres
     path, bounce = view.strands.legs()
     shown = np.ones(len(path), dtype=bool) if view.upto is None else bounce <= view.upto
-    ends = np.stack(exploded(view.strands, view.shift), axis=1)[shown]
+    ends = np.stack(explode(view.strands, view.shift), axis=1)[shown]
     count = len(ends)
     cells = np.column_stack([np.full(count, 2), np.arange(2 * count).reshape(-1, 2)])
     data = pyvista.PolyData(ends.reshape(-1, 3) / metres, lines=cells.ravel())
@@ -108,7 +108,7 @@ def legs(view: View) -> PolyData:
 
 
 def surface(solid: Solid, metres: float) -> PolyData:
-    """A surface's triangles.
+    """Triangle data of a surface.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def surface(solid: Solid, metres: float) -> PolyData:
 
 
 def chip(panel: Panel, metres: float) -> PolyData:
-    """The pixels of a CCD as squares with their light, `image`; row 0 below, seen from its front.
+    """CCD pixels as squares with their irradiance `image`; row 0 below, seen from the front.
 
     Parameters
     ----------
@@ -189,13 +189,13 @@ def _legend(plotter: Plotter, entries: Sequence[tuple[str, str]], left: float, t
                 position=(at, y),
                 viewport=True,
                 color=ink,
-                font_size=sized(plotter, size),
+                font_size=font_size(plotter, size),
                 name=f"{what} {row} {at}",
             )
 
 
-def sized(plotter: Plotter, size: int) -> int:
-    """A font's size in proportion to the picture.
+def font_size(plotter: Plotter, size: int) -> int:
+    """Font size in proportion to the picture.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def _short(name: str) -> str:
 
 
 def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
-    """Rays, what their colours stand for, and how many they are.
+    """Draw rays, their colour legend and their number.
 
     Parameters
     ----------
@@ -225,12 +225,12 @@ def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
     Returns
     -------
     pyvista.PolyData or None
-        That is drawn: new `legs` copied into it are shown. None: there are no rays.
+        That is drawn: new `path_lines` copied into it are shown. None: there are no rays.
     """
     strands, stage = view.strands, view.stage
     if strands is None or not len(strands):
         return None
-    data = legs(view)
+    data = path_lines(view)
     found = scale(strands, view.colour, stage.unit, stage.metres)
     clim = (-0.5, len(found.names) - 0.5) if found.names else (found.low, found.high)
     title, several = found.title, {"n_labels": 3}
@@ -251,7 +251,7 @@ def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
         position=(0.02, 0.955),
         viewport=True,
         color=INK,
-        font_size=sized(plotter, 11),
+        font_size=font_size(plotter, 11),
         name="caption",
     )
     _legend(plotter, list(zip(found.names, found.colours, strict=False)), 0.02, 0.915, "ray")
@@ -259,7 +259,9 @@ def draw_rays(plotter: Plotter, view: View) -> PolyData | None:
 
 
 def _bar(plotter: Plotter) -> dict[str, Any]:
-    sizes = {name: sized(plotter, size) for name, size in (("title_font_size", 20), ("label_font_size", 18))}
+    sizes = {
+        name: font_size(plotter, size) for name, size in (("title_font_size", 20), ("label_font_size", 18))
+    }
     return {**BAR, **sizes}
 
 
@@ -297,9 +299,9 @@ def _draw_ends(plotter: Plotter, stage: Stage) -> None:
 
 def _label(plotter: Plotter, spot: FloatArray, text: str, vertical: str, size: int) -> None:
     plotter.add_point_labels(
-        spot[None, :], [text], font_size=sized(plotter, size), text_color=INK, shape=None, show_points=False,
-        always_visible=True, justification_horizontal="center", justification_vertical=vertical,
-        pickable=False,
+        spot[None, :], [text], font_size=font_size(plotter, size), text_color=INK, shape=None,
+        show_points=False, always_visible=True, justification_horizontal="center",
+        justification_vertical=vertical, pickable=False,
     )  # fmt: skip
 
 
@@ -322,8 +324,8 @@ def _fitting(bounds: Sequence[float], size: Sequence[int]) -> float:
     return float(0.5 * MARGIN * max(height, width * size[1] / size[0]))
 
 
-def clip(plotter: Plotter, normal: FloatArray | None, origin: FloatArray | None) -> None:
-    """Hide all that is on the side of a plane that its normal points to.
+def clip_plane(plotter: Plotter, normal: FloatArray | None, origin: FloatArray | None) -> None:
+    """Clip all objects at a plane: hide the side that its normal points to.
 
     Parameters
     ----------
@@ -346,7 +348,7 @@ def clip(plotter: Plotter, normal: FloatArray | None, origin: FloatArray | None)
 
 
 def draw(plotter: Plotter, view: View) -> PolyData | None:
-    """The whole scene, seen from -y, a little from the right and from above.
+    """Draw the whole scene, seen from -y, slightly from the right and from above.
 
     Parameters
     ----------
@@ -368,12 +370,12 @@ def draw(plotter: Plotter, view: View) -> PolyData | None:
         _label(plotter, spot / stage.metres, name, "bottom" if above else "top", 22)
     if view.clip is not None:
         normal, origin = view.clip
-        clip(plotter, normal, origin / stage.metres)
+        clip_plane(plotter, normal, origin / stage.metres)
     unit = stage.unit
     bounds, (nx, ny, nz) = _round_bounds(plotter.bounds)
     plotter.show_grid(
         bounds=bounds, xtitle=f"x / {unit}", ytitle=f"y / {unit}", ztitle=f"z / {unit}",
-        font_size=sized(plotter, 18), color="#808080", n_xlabels=nx, n_ylabels=ny,
+        font_size=font_size(plotter, 18), color="#808080", n_xlabels=nx, n_ylabels=ny,
         n_zlabels=nz, fmt="%.4g", use_3d_text=False,
     )  # fmt: skip
     plotter.camera_position = "xz"
@@ -384,7 +386,7 @@ def draw(plotter: Plotter, view: View) -> PolyData | None:
 
 
 def empty(size: tuple[int, int], off_screen: bool = True) -> Plotter:
-    """A plotter with nothing in it; VTK is loaded.
+    """Empty plotter; imports VTK.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A window with a scene: sliders that re-phase without tracing, a clipping plane, rays to click on."""
+"""Interactive window of a scene: sliders that re-phase the rays, a clipping plane, ray picking."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from fringetrace.core import nm
-from fringetrace.views.scene3d.describe import told
+from fringetrace.views.scene3d.describe import describe_polyline
 from fringetrace.views.scene3d.layout import apart
 from fringetrace.views.scene3d.palette import WAYS
-from fringetrace.views.scene3d.vtk import Plotter, View, chip, clip, draw, draw_rays, empty, legs
+from fringetrace.views.scene3d.vtk import Plotter, View, chip, clip_plane, draw, draw_rays, empty, path_lines
 
 HELP = "right click on a ray: its path;  c: colours;  p: clipping plane;  r: whole scene;  q: close"
 # Where sliders are: their left and right ends, from below; parts of the window.
@@ -22,7 +22,7 @@ LEFT, RIGHT, LOWEST, APART = 0.72, 0.97, 0.08, 0.11
 
 @dataclass(eq=False)
 class Window:
-    """A view that sliders change; nothing is traced.
+    """View that sliders change without a new trace.
 
     Parameters
     ----------
@@ -45,7 +45,7 @@ class Window:
     planes: list[Any] = field(default_factory=list)
 
     def changed(self, **parts: Any) -> None:
-        """Draw rays anew, some parts of the view being other ones.
+        """Redraw rays after a change of the view.
 
         Parameters
         ----------
@@ -54,7 +54,7 @@ class Window:
         """
         self.view = replace(self.view, **parts)
         if self.rays is not None:
-            self.rays.copy_from(legs(self.view))
+            self.rays.copy_from(path_lines(self.view))
         if "step" in parts and self.view.frames is not None and self.pixels is not None:
             count = len(self.view.frames)
             frame = self.view.frames[round(self.view.step * count / (2.0 * np.pi)) % count]
@@ -63,7 +63,7 @@ class Window:
             self.pick(self.picked)
 
     def recoloured(self, colour: str) -> None:
-        """Colour rays by something else, with its legend.
+        """Recolour rays, with a new legend.
 
         Parameters
         ----------
@@ -79,32 +79,32 @@ class Window:
         self.rays = draw_rays(self.plotter, self.view)
 
     def next_colour(self) -> None:
-        """Colour rays by what comes next."""
+        """Recolour rays by the next colouring."""
         strands = self.view.strands
         ways = [way for way in WAYS if way != "phase" or (strands is not None and len(strands.wavelengths))]
         self.recoloured(ways[(ways.index(self.view.colour) + 1) % len(ways)])
 
     def wavelength(self, value: float) -> None:
-        """Phases at a wavelength, nm: the nearest of those that are known."""
+        """Set the wavelength in nm: the nearest for which phases are known."""
         strands = self.view.strands
         assert strands is not None
         self.changed(wavelength=int(np.argmin(np.abs(strands.wavelengths / nm - value))))
 
     def step(self, value: float) -> None:
-        """A phase step, degrees."""
+        """Set the phase step in degrees."""
         self.changed(step=float(np.radians(value)))
 
     def upto(self, value: float) -> None:
-        """Light only up to the surface after so many."""
+        """Show light only up to the surface after so many."""
         self.changed(upto=round(value))
 
     def explode(self, value: float) -> None:
-        """Legs apart, by so many times a shift that parts them well."""
+        """Separate segments by so many times the standard displacement."""
         assert self.view.strands is not None
         self.changed(shift=value * apart(self.view.strands))
 
     def pick(self, number: int) -> None:
-        """Show a strand's path, in words and in black.
+        """Show a path in black, and its description.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class Window:
         shown = self.view.strands
         assert shown is not None
         self.picked = number
-        text = told(shown, number, self.view.wavelength, self.view.step)
+        text = describe_polyline(shown, number, self.view.wavelength, self.view.step)
         note = self.plotter.add_text(
             text,
             position=(0.01, 0.03),
@@ -125,7 +125,7 @@ class Window:
             font="courier",
         )
         note.prop.background_color, note.prop.background_opacity = "white", 0.85
-        data = legs(self.view)
+        data = path_lines(self.view)
         mine = np.flatnonzero(np.asarray(data.cell_data["strand"]) == number)
         if len(mine):
             self.plotter.add_mesh(
@@ -134,7 +134,7 @@ class Window:
             )  # fmt: skip
 
     def clicked(self, picker: Any) -> None:
-        """A pick made with the mouse.
+        """Handle a mouse pick.
 
         Parameters
         ----------
@@ -146,21 +146,21 @@ class Window:
                 self.pick(int(strand[picker.GetCellId()]))
 
     def toggle_plane(self) -> None:
-        """A plane that hides what is in front of it, to be moved and turned; or none any more."""
+        """Show or remove the clipping plane."""
         if self.planes:
             self.planes.pop()
             self.plotter.clear_plane_widgets()
-            clip(self.plotter, None, None)
+            clip_plane(self.plotter, None, None)
             return
 
         def moved(normal: Any, origin: Any) -> None:
-            clip(self.plotter, np.asarray(normal), np.asarray(origin))
+            clip_plane(self.plotter, np.asarray(normal), np.asarray(origin))
 
         self.planes.append(self.plotter.add_plane_widget(moved, normal="-y", color="#606060"))
 
 
-def furnished(view: View, plotter: Plotter) -> Window:
-    """A view in a plotter, with all its sliders and keys.
+def furnish(view: View, plotter: Plotter) -> Window:
+    """Plotter of a view with all its sliders and keys.
 
     Parameters
     ----------
@@ -221,9 +221,9 @@ def _sliders(window: Window) -> None:
         )  # fmt: skip
 
 
-def received() -> None:
-    """In a process of its own: open a window with the view that comes on standard input."""
+def receive() -> None:
+    """Open a window with the view on standard input; runs in a separate process."""
     plotter = empty((400, 300), off_screen=False)
     view, plotter.window_size = pickle.load(sys.stdin.buffer)
-    furnished(view, plotter)
+    furnish(view, plotter)
     plotter.show()

@@ -1,7 +1,7 @@
 """Beyond the study: matter, true cylinders, counts and disorder, traced, beside the rigorous answer.
 
-python benchmarks/feathers.py            print
-python benchmarks/feathers.py --write    and put figure and table into docs/study.md
+python docs/figures/feathers.py            print
+python docs/figures/feathers.py --write    and put figure and table into docs/study.md
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ import fringetrace as ft
 from fringetrace import degree, nm
 from fringetrace.scattering.detectors import Cones
 from fringetrace.scattering.goniometer import brdf
-from fringetrace.scattering.rod_lattice import Lattice
+from fringetrace.scattering.rod_lattice import RodLattice
 from fringetrace.scattering.rod_studies import cluster, specular
 
 PAGE, FIGURE = pages.DOCS / "study.md", pages.DOCS / "images" / "feathers.png"
 WAVES = np.linspace(400, 700, 16) * nm
 BACK = Cones([0.0], 2 * degree)
-MIRRORS = Lattice()
-FEATHER = Lattice(
+MIRRORS = RodLattice()
+FEATHER = RodLattice(
     6, 4, pitch=150 * nm, arrangement="square", rod="melanin", host="keratin", cortex=100 * nm
 )  # fmt: skip
 
 
-def straight_back(kind: Lattice, method: str = "diffraction", rays: int = 250) -> np.ndarray:
+def straight_back(kind: RodLattice, method: str = "diffraction", rays: int = 250) -> np.ndarray:
     """BRDF from 0 to 0 degrees by rays."""
     table = brdf(
         kind.scene, 0.0, BACK, WAVES, method=method, rays=(1, rays), min_amplitude=3e-2, **kind.lighting
@@ -37,7 +37,7 @@ def straight_back(kind: Lattice, method: str = "diffraction", rays: int = 250) -
     return table.values.ravel()
 
 
-def rigorous(kind: Lattice) -> np.ndarray:
+def rigorous(kind: RodLattice) -> np.ndarray:
     """The same, rigorously."""
     return cluster(kind, 0.0, 0.0, WAVES).ravel()
 

@@ -1,7 +1,7 @@
 """The pictures of docs/colour.md: swatches, colours against angles, spheres, a spectrum; and what aliases.
 
-python benchmarks/colours.py           draw the pictures
-python benchmarks/colours.py --write   and put what fringes need into docs/colour.md
+python docs/figures/colours.py           draw the pictures
+python docs/figures/colours.py --write   and put what fringes need into docs/colour.md
 """
 
 import sys
@@ -17,8 +17,8 @@ from fringetrace.core import tables
 from fringetrace.scattering import bsdf_tables, colour
 from fringetrace.views.plots import colour_plots
 
-IMAGES = Path(__file__).parents[1] / "docs" / "images"
-W = colour.samples(4e-6)
+IMAGES = Path(__file__).parents[1] / "images"
+W = colour.resolving_wavelengths(4e-6)
 
 
 def soap(thickness):
@@ -90,23 +90,27 @@ def main():
 
     theta, phi = np.radians(np.arange(0, 88, 3.0)), np.radians(np.arange(0, 360, 10.0))
     brdf = rough(theta, theta, phi)
-    table = bsdf_tables.table(colour.xyz(np.pi * brdf, W)[:, None], theta, [0.0], theta, phi, [0.0, 1.0, 2.0])
+    table = bsdf_tables.brdf_table(
+        colour.xyz(np.pi * brdf, W)[:, None], theta, [0.0], theta, phi, [0.0, 1.0, 2.0]
+    )
     figure = Figure(figsize=(11.5, 4.6), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     in_plane = table.sel(phi_o=np.pi).isel(phi_i=0)
     colour_plots.angles(np.asarray(in_plane), theta, theta, left)
     left.set_title("rough pile of layers, in plane")
-    ball = bsdf_tables.sphere(table, (0.5, 0.5, 0.7))
-    colour_plots.sphere(ball, middle, title="a sphere of it, one light")
+    ball = bsdf_tables.shaded_sphere(table, (0.5, 0.5, 0.7))
+    colour_plots.draw_sphere(ball, middle, title="a sphere of it, one light")
     mirror = colour.xyz(layers(np.cos(theta)), W)
-    colour_plots.sphere(colour_plots.mirrored(mirror, theta), right, title="smooth, white sky all around")
+    colour_plots.draw_sphere(
+        colour_plots.mirrored(mirror, theta), right, title="smooth, white sky all around"
+    )
     views.save(figure, IMAGES / "colour_angles.png")
 
     noisy = layers(1.0) + np.random.default_rng(0).normal(0, 0.01, len(W))
     axes = {"sample": (["made up, with noise"], ""), "wavelength": (W, "m")}
     sample = tables.labelled(noisy[None], axes, name="reflectance", unit="1")
     both = layers(np.cos(np.radians([0, 40])))
-    ax = colour_plots.spectrum(both, W, labels=["0°", "40°"], measured=sample)
+    ax = colour_plots.coloured_spectra(both, W, labels=["0°", "40°"], measured=sample)
     views.save(ax, IMAGES / "colour_spectrum.png")
 
 

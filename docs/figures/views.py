@@ -1,4 +1,4 @@
-"""The pictures of docs/views.md: python benchmarks/views.py."""
+"""The pictures of docs/views.md: python docs/figures/views.py."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def michelson() -> None:
         bench, paths, IMAGES / "views_phase.png", wavelength=633 * nm, colour="phase", explode=0.5,
         tubes=0.06 * mm, surfaces="name",
     )  # fmt: skip
-    print(views.itinerary(bench.sampled((9, 12)).detected, 5, 633 * nm))
+    print(views.describe_path(bench.sampled((9, 12)).detected, 5, 633 * nm))
 
 
 def glass() -> None:

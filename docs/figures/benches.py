@@ -22,7 +22,7 @@ CELL, WATER = 1.38, 1.335
 def arms(bench, wavelength):
     """Rays by the sample, and the path of the reference."""
     seen = bench.trace(wavelength).detected
-    visits = seen.visits(bench.reference)
+    visits = seen.visits(bench.arms.reference.surface)
     return seen.where(visits == 0), seen.where(visits == 1).length.mean()
 
 
@@ -155,7 +155,7 @@ def michelson():
     bench = flat(0.0, splitter=plate_of_glass, arm=12 * mm)
     seen = bench.trace(RED).detected
     strong = seen.where(np.abs(seen.amplitude) > 0.3)
-    arm, n = strong.visits(bench.reference), BK7.index(RED).real
+    arm, n = strong.visits(bench.arms.reference.surface), BK7.index(RED).real
     added = 4 * mm * (math.sqrt(n * n - 0.5) - math.sqrt(0.5))
     off = abs(strong.length[arm == 0].mean() - strong.length[arm == 1].mean() - added) / RED
     yield (
