@@ -10,6 +10,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 
 import mpmath
 import numpy as np
@@ -58,10 +59,11 @@ def exact_length(paths, row):
     origin = [mpmath.mpf(float(x)) for x in rays.origin[paths.ray[row]]]
     along = unit_mp([mpmath.mpf(float(x)) for x in rays.direction[paths.ray[row]]])
     total = mpmath.mpf(float(rays.length[paths.ray[row]]))
+    plane = cache(partial(plane_mp, paths))  # few triangles are met many times
     for surface, triangle in zip(paths.surface[row], paths.triangle[row], strict=True):
         if surface < 0:
             break
-        corner, normal = plane_mp(paths, surface, triangle)
+        corner, normal = plane(surface, triangle)
         offset = [c - o for c, o in zip(corner, origin, strict=True)]
         step = dot_mp(offset, normal) / dot_mp(along, normal)
         origin = [o + step * d for o, d in zip(origin, along, strict=True)]

@@ -47,6 +47,7 @@ def feathers(tmp_path):
     return str(tmp_path / "feathers.csv")
 
 
+@pytest.mark.slow
 def test_a_mesh_of_matter_in_polarised_light_beside_measured_spectra(rods, feathers, tmp_path, capsys):
     given = ["brdf", str(rods), "--unit", "um", *SHORT, "--rays", "1", "60", "--measured", feathers]
     given += ["--material", "1.7", "--around", "1.5"]

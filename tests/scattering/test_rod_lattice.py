@@ -130,5 +130,5 @@ def test_what_is_refused(changed, error, message):
 
 
 def test_matter_may_not_overlap():
-    with pytest.raises(ValueError, match="Cylinders: expected them apart"):
+    with pytest.raises(ValueError, match="rods: expected them apart"):
         _ = RodLattice(rod=1.5, disorder=0.3).scene

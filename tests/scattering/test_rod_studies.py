@@ -14,6 +14,7 @@ from fringetrace.scattering import rod_studies
 from fringetrace.scattering.detectors import Cones
 from fringetrace.scattering.goniometer import brdf
 from fringetrace.scattering.rod_lattice import RodLattice
+from fringetrace.scattering.rod_solvers import lattice_cylinders, lattice_gratings
 from fringetrace.scattering.rod_studies import cluster, specular, study
 
 WAVES = np.linspace(400, 600, 5) * nm
@@ -103,7 +104,9 @@ def test_rigorous_rods_are_those_of_cylinders():
     with ThreadPoolExecutor(1) as pool:
         table = study(kind, {"seed": [0]}, [0.3], [-0.5], WAVES, method="rods", executor=pool)
     angles = -np.pi / 2 - 0.3, np.pi / 2 + 0.5
-    width = np.array([differential_width(scatter(kind.cylinders, w, angles[0]), angles[1]) for w in WAVES])
+    width = np.array(
+        [differential_width(scatter(lattice_cylinders(kind), w, angles[0]), angles[1]) for w in WAVES]
+    )
     span = 2.5 * kind.pitch + 2 * kind.radius
     true = 3 * um / WAVES * width[:, 0, 0] / (span * np.cos(0.3) * np.cos(0.5))
     assert table.values.ravel() == pytest.approx(
@@ -124,7 +127,7 @@ def test_endless_rows_and_layers_are_those_of_lattices():
         found = specular(kind, [0.0], [480 * nm, 500 * nm], polarisation=polarisation)
         assert found.values[0] == pytest.approx(true, rel=1e-6)
     layers = specular(kind, [0.1], WAVES, method="multilayer")
-    true = reflectance_spectrum(kind.endless, WAVES, 0.1, method="multilayer").reflectance
+    true = reflectance_spectrum(lattice_gratings(kind), WAVES, 0.1, method="multilayer").reflectance
     assert layers.values[0] == pytest.approx(true, rel=1e-12)
     with pytest.raises(ValueError, match=r"endless rows: expected no disorder, got 0\.1"):
         specular(RodLattice(disorder=0.1), [0.0], WAVES)

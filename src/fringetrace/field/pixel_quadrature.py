@@ -110,7 +110,7 @@ def averaged(
     groups = (light.groups,) if carrier else (light.groups, light.groups)
     images = 1 + max(case.image for case in cases)
     total = np.zeros((images, int(np.prod(groups)), *cut.shape), dtype=np.complex128)
-    orders = np.zeros((len(cases), *cut.shape), dtype=np.int64)
+    orders = np.zeros((len(cases), *cut.shape), dtype=np.int8)
     slopes: list[FloatArray] = []
     for order, case in zip(orders, cases, strict=True):
         parts = _each(lambda found, case=case: light.field(found, case), centres)  # type: ignore[misc]
@@ -123,7 +123,7 @@ def averaged(
 
     def sampled(band: tuple[int, int]) -> None:
         mine = slice(*band)
-        for order in _distinct(orders[:, mine]):
+        for order in _distinct(orders[:, mine].astype(np.int64)):
             points = samples(order, top + band[0], cuts)
             found = light.at(points, False)
             for its, case in zip(orders[:, mine], cases, strict=True):
@@ -132,7 +132,7 @@ def averaged(
                     field, _ = light.field(found, case)
                     points.add_means(field, here, case.weight, not carrier, total[case.image, ..., mine, :])
 
-    _each(sampled, bands(orders.max(axis=0)))
+    _each(sampled, bands(orders.max(axis=0).astype(np.int64)))
     return total.reshape(-1, *groups, *cut.shape)
 
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, short_repr
 
 # Gauss points a pixel, along either axis: at least LEAST, for the curvature of a smooth irradiance.
 LEAST, MOST = 2, 32
@@ -88,6 +88,8 @@ class Samples:
     where_x: FloatArray
     where_y: FloatArray
 
+    __repr__ = short_repr
+
     def blank(self, groups: int) -> ComplexArray:
         """Zero field at the sample points, (groups, points)."""
         return np.zeros((groups, len(self.x)), dtype=np.complex128)
@@ -133,6 +135,8 @@ class Edges:
     pixel: npt.NDArray[np.int64]
     begin: npt.NDArray[np.int64]
     lines: npt.NDArray[np.int64]
+
+    __repr__ = short_repr
 
 
 def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:

@@ -23,6 +23,7 @@ from fringetrace.core import (
     checked_vector,
     component,
     dot,
+    short_repr,
 )
 
 # An axis nearer to a ray than its own rounding has no direction across it.
@@ -59,6 +60,8 @@ class IncidentRays:
     field: ComplexArray
     wavelength: float | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Branch:
@@ -79,6 +82,8 @@ class Branch:
     direction: FloatArray | None = None
     point: FloatArray | None = None
     path: FloatArray | None = None
+
+    __repr__ = short_repr
 
 
 class Element(Protocol):
@@ -287,6 +292,8 @@ class Annulus:
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Annulus centre"))
         radii = (self.inner, self.outer)
@@ -343,6 +350,8 @@ class IdealLens:
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "IdealLens centre"))

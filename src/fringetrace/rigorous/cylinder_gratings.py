@@ -18,7 +18,15 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_lengths, checked_whole
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    checked_angles,
+    checked_lengths,
+    checked_whole,
+    short_repr,
+)
 from fringetrace.optics import Polarisation, check_polarisation
 from fringetrace.rigorous.cylindrical_waves import (
     Index,
@@ -53,6 +61,8 @@ class Row:
     index: Index
     offset: float = 0.0
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True)
 class CylinderGratings:
@@ -83,6 +93,8 @@ class CylinderGratings:
     host: Index
     front: Index = 1.0
     back: Index | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not (0 < self.pitch < math.inf and 0 < self.thickness < math.inf):
@@ -116,6 +128,9 @@ class Diffraction(NamedTuple):
     transmitted: ComplexArray
     reflectance: FloatArray
     transmittance: FloatArray
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 class _Section(NamedTuple):

@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole, short_repr
+from fringetrace.geometry import check_circles_apart
 from fringetrace.optics import Polarisation
 from fringetrace.rigorous.cylindrical_waves import (
     CONDUCTOR as CONDUCTOR,
@@ -60,6 +61,8 @@ class Cylinders:
     index: Index | Sequence[Index]
     host: Index = 1.0
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         centres = np.atleast_2d(np.asarray(self.centres, np.float64))
         if centres.ndim != 2 or centres.shape[1] != 2 or len(centres) == 0:
@@ -75,7 +78,7 @@ class Cylinders:
         for index in (*several, self.host):
             if not callable(index):
                 checked_index(index, "Cylinders")
-        _check_apart(centres, radii)
+        check_circles_apart(centres, radii, "Cylinders")
         object.__setattr__(self, "centres", centres)
         object.__setattr__(self, "radii", radii)
 
@@ -86,6 +89,9 @@ class Widths(NamedTuple):
     extinction: FloatArray
     scattering: FloatArray
     absorption: FloatArray
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @dataclass(frozen=True)
@@ -110,6 +116,8 @@ class Scattered:
     angle: FloatArray
     exciting: ComplexArray
     outgoing: ComplexArray
+
+    __repr__ = short_repr
 
     @property
     def wavenumber(self) -> float:
@@ -338,21 +346,6 @@ def _indices(cylinders: Cylinders, wavelength: float) -> ComplexArray:
     """Refractive index of each cylinder at a wavelength, (n,) complex128."""
     values = [indices_at(index, np.asarray(wavelength)) for index in _each(cylinders.index)]
     return np.broadcast_to(np.asarray(values, np.complex128), (len(np.asarray(cylinders.centres)),))
-
-
-def _check_apart(centres: FloatArray, radii: FloatArray) -> None:
-    """Raise ValueError if cylinders overlap."""
-    from scipy.spatial import cKDTree
-
-    pairs = cKDTree(centres).query_pairs(2.0 * radii.max(), output_type="ndarray")
-    i, j = pairs.T
-    gap = np.hypot(*(centres[i] - centres[j]).T) - radii[i] - radii[j]
-    if np.any(gap < 0):
-        worst = gap.argmin()
-        raise ValueError(
-            f"Cylinders: expected them apart, got {i[worst]} and {j[worst]} "
-            f"overlapping by {-gap[worst]:.3g} m"
-        )
 
 
 def _chunks(count: int, width: int) -> list[slice]:

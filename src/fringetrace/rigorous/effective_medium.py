@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import ComplexArray, FloatArray, checked_angles, checked_lengths, filled
+from fringetrace.core import ComplexArray, FloatArray, checked_angles, checked_lengths, filled, short_repr
 from fringetrace.optics import Polarisation, check_polarisation
 from fringetrace.rigorous.cylindrical_waves import checked_index
 
@@ -21,6 +21,9 @@ class SlabPowers(NamedTuple):
 
     reflectance: FloatArray
     transmittance: FloatArray
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 def effective_index(fraction: FloatArray, index: ComplexArray, polarisation: Polarisation) -> ComplexArray:

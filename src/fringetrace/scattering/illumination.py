@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_length
+from fringetrace.core import FloatArray, checked_length, short_repr
 from fringetrace.geometry import breadth
 from fringetrace.rigorous import CONDUCTOR, Index, Validity, validity
 from fringetrace.scattering.detectors import sides, towards
@@ -114,6 +114,8 @@ class Illumination:
     rays: tuple[int, int] = (256, 256)
     centre: npt.ArrayLike | None = None
     source: SourceFunction | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         low, high = self.bounds

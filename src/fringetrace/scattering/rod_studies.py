@@ -18,6 +18,7 @@ from fringetrace.scattering.detectors import Cones, checked_angles
 from fringetrace.scattering.far_fields import FATES
 from fringetrace.scattering.goniometer import AXES, METHODS, brdf
 from fringetrace.scattering.rod_lattice import MEDIA, RodLattice as RodLattice
+from fringetrace.scattering.rod_solvers import lattice_cylinders, lattice_gratings, lattice_validity
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -69,7 +70,7 @@ def cluster(
 
     Parameters
     ----------
-    lattice : Lattice
+    lattice : RodLattice
         Rods may not overlap.
     theta_i, theta_o : (n,) radians
         Position angles, outside of the host.
@@ -90,7 +91,7 @@ def cluster(
         e, h = (cluster(lattice, theta_i, theta_o, wavelengths, each) for each in get_args(Polarisation))
         return 0.5 * (e + h)
     start, end = checked_angles(theta_i, "cluster theta_i"), checked_angles(theta_o, "cluster theta_o")
-    rods, (width, _) = lattice.cylinders, lattice.footprint
+    rods, (width, _) = lattice_cylinders(lattice), lattice.footprint
     values = []
     for wave in checked_wavelengths(wavelengths):
         host = 1.0 if lattice.host is None else float(lattice.host.index(wave).real)
@@ -126,13 +127,13 @@ def specular(
 
     Parameters
     ----------
-    lattice : Lattice
+    lattice : RodLattice
         Without disorder; its columns do not matter.
     theta_i : (n,) radians
         From where, outside of the host.
     wavelengths : (w,) float64, metres
     method, polarisation
-        See `lattices.reflectance_spectrum`.
+        See `cylinder_gratings.reflectance_spectrum`.
 
     Returns
     -------
@@ -143,10 +144,10 @@ def specular(
     Raises
     ------
     ValueError
-        As `Lattice.endless` and `lattices.reflectance_spectrum`.
+        As `lattice_gratings` and `cylinder_gratings.reflectance_spectrum`.
     """
     start, waves = checked_angles(theta_i, "specular theta_i"), checked_wavelengths(wavelengths)
-    found = reflectance_spectrum(lattice.endless, waves, start[:, None], polarisation, method)
+    found = reflectance_spectrum(lattice_gratings(lattice), waves, start[:, None], polarisation, method)
     axes = ("theta_i", "wavelength")
     coordinates = {
         "theta_i": ("theta_i", start, {"units": "rad"}),
@@ -165,7 +166,9 @@ def specular(
 
 def validity_attributes(kinds: Sequence[RodLattice], waves: FloatArray) -> dict[str, float | str]:
     """Validity attributes for the smallest of some rods at the longest of some wavelengths."""
-    return min((kind.validity(waves.max()) for kind in kinds), key=lambda v: v.size_parameter).attributes
+    return min(
+        (lattice_validity(kind, waves.max()) for kind in kinds), key=lambda v: v.size_parameter
+    ).attributes
 
 
 def _spoken(lattice: RodLattice) -> dict[str, Any]:
@@ -206,7 +209,7 @@ def study(
 
     Parameters
     ----------
-    lattice : Lattice
+    lattice : RodLattice
         What stays the same.
     axes : dict of sequences
         Values of each parameter that changes, by the names of `RodLattice`; every combination is traced.

@@ -12,7 +12,10 @@ from fringetrace.core import (
     FloatArray,
     checked_direction,
     checked_vector,
+    described,
     frame,
+    length_text,
+    value_text,
 )
 from fringetrace.optics import checked_jones
 from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive, checked_size
@@ -99,6 +102,17 @@ class Beam:
     passes: tuple[str, ...] = ()
     polarisation: ComplexArray | None = None
     axes: PlaneAxes = field(init=False, repr=False)  # of columns, rows, and the direction
+
+    def __repr__(self) -> str:
+        (rows, columns), (width, height) = self.shape, self.size
+        return described(
+            self,
+            f"{columns} x {rows} rays, {length_text(width)} x {length_text(height)}",
+            f"centre {value_text(self.centre)} m, direction {value_text(self.axes[2])}",
+            "" if self.profile is None else f"profile {value_text(self.profile)}",
+            "" if self.polarisation is None else f"polarisation {value_text(self.polarisation)}",
+            f"passes {value_text(self.passes)}" if self.passes else "",
+        )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Beam centre"))
