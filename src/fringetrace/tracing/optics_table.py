@@ -10,11 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray, checked_wavelength
-from fringetrace.optics import Dielectric, Metal
 from fringetrace.scene import Scene, Surface
 
 if TYPE_CHECKING:
-    from fringetrace.optics import Element, Material
+    from fringetrace.optics import Dielectric, Element, Interface, Material, Metal
 
 # What a surface is: of constant amplitudes, or a boundary between two media.
 CONSTANT, BOUNDARY = 0, 1
@@ -112,8 +111,7 @@ def scene_media(scene: Scene) -> tuple[Material, ...]:
 
 
 def _film(surface: Surface) -> tuple[tuple[Material, float], ...]:
-    film = surface.interface.film if isinstance(surface.interface, (Dielectric, Metal)) else None
-    return () if film is None else film.layers
+    return () if surface.film is None else surface.film.layers
 
 
 def plain(scene: Scene, polarised: bool) -> bool:
@@ -128,7 +126,7 @@ def plain(scene: Scene, polarised: bool) -> bool:
     -------
     bool
     """
-    acting = any(surface.boundary or hasattr(surface.interface, "act") for surface in scene.surfaces)
+    acting = any(surface.interface.kind != "constant" for surface in scene.surfaces)
     if acting or polarised:
         return False
     around = scene.medium
@@ -154,7 +152,7 @@ def needs(scene: Scene) -> str | None:
     for surface in scene.surfaces:
         if _film(surface):
             return f"{surface.name} has a film"
-        if getattr(surface.interface, "chromatic", False):
+        if surface.interface.chromatic:
             return f"{surface.name} depends on it"
     return None
 
@@ -235,8 +233,8 @@ def thin(scene: Scene) -> dict[int, Element]:
     -------
     dict of int to Element
     """
-    acting = ((i, surface.interface) for i, surface in enumerate(scene.surfaces))
-    return {i: cast("Element", interface) for i, interface in acting if hasattr(interface, "act")}
+    found = enumerate(surface.element for surface in scene.surfaces)
+    return {number: element for number, element in found if element is not None}
 
 
 def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
@@ -254,20 +252,20 @@ def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
     table = np.zeros((2, len(scene.surfaces)), dtype=np.complex128)
     for number, surface in enumerate(scene.surfaces):
         interface = surface.interface
-        if hasattr(interface, "act"):
+        if interface.kind == "element":
             table[1, number] = 1.0
-        elif not isinstance(interface, (Dielectric, Metal)):
-            table[:, number] = interface.reflection, interface.transmission
+        elif interface.kind == "constant":
+            constant = cast("Interface", interface)
+            table[:, number] = constant.reflection, constant.transmission
     return table[0], table[1]
 
 
 def followed_branches(surface: Surface) -> int:
     """Bits of the branches that are traced at a surface: reflected, transmitted, or opaque."""
-    if isinstance(surface.interface, Metal):
-        return REFLECTED | OPAQUE
-    if isinstance(surface.interface, Dielectric):
-        return FOLLOW[surface.interface.follow]
-    return REFLECTED | TRANSMITTED
+    if not surface.boundary:
+        return REFLECTED | TRANSMITTED
+    boundary = cast("Dielectric | Metal", surface.interface)
+    return FOLLOW[boundary.follow] | (OPAQUE if boundary.opaque else 0)
 
 
 def _layers(scene: Scene, wavelength: float) -> tuple[Array, ComplexArray, Array, tuple[ComplexArray, Array]]:
