@@ -22,13 +22,13 @@ X = 0.13 * mm
 def sent(monkeypatch):
     """Rays of each trace that looks where light goes."""
     counts = []
-    trace = probe.trace
+    retrace = probe.retrace
 
-    def counted(scene, rays, *args, **options):
+    def counted(paths, rays, **options):
         counts.append(len(rays))
-        return trace(scene, rays, *args, **options)
+        return retrace(paths, rays, **options)
 
-    monkeypatch.setattr(probe, "trace", counted)
+    monkeypatch.setattr(probe, "retrace", counted)
     return counts
 
 

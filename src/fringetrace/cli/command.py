@@ -192,7 +192,7 @@ def bench(
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
     """Trace, measure, write; say what was done."""
     from fringetrace.accuracy import checks
-    from fringetrace.field import chosen
+    from fringetrace.field import choose
     from fringetrace.validation import measurement
     from fringetrace.views import viewer
 
@@ -211,8 +211,9 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             start = time.perf_counter()
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
-        method = chosen(bench.trace(), bench.method)
-        costing = aside.submit(checks.judge, bench.trace(), wavelength, method)
+        choice = choose(bench.trace(), bench.method)
+        _say(console, "method", str(choice))
+        costing = aside.submit(checks.judge, bench.trace(), wavelength, choice.method)
         measured = measurement.measure_height(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)

@@ -1,5 +1,5 @@
 from . import sweeps as sweeps, tables as tables, vectors as vectors
-from .compiled import grown as grown, jit as jit, part as part
+from .compiled import grown as grown, jit as jit, lean as lean, part as part
 from .files import staged as staged, whole as whole
 from .represent import (
     described as described,

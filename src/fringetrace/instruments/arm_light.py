@@ -29,12 +29,12 @@ def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> Comp
     """
     if chosen(paths, method) == "rays":
         return ray_sums(paths, mark, wavelength)
-    fields = complex_field(paths, wavelength, groups=mark.count(paths), method="wavefront")
+    fields = complex_field(paths, wavelength, groups=mark.count(paths), method=method)
     return _padded(fields, 1)
 
 
-def arm_mutual_intensity(paths: Paths, mark: Mark, light: float | Spectrum) -> ComplexArray:
-    """Mutual intensity of the counts of a mark, averaged over each pixel, by the wavefront method.
+def arm_mutual_intensity(paths: Paths, mark: Mark, light: float | Spectrum, method: str) -> ComplexArray:
+    """Mutual intensity of the counts of a mark, averaged over each pixel.
 
     Parameters
     ----------
@@ -42,13 +42,15 @@ def arm_mutual_intensity(paths: Paths, mark: Mark, light: float | Spectrum) -> C
         See `arm_fields`.
     light : float or Spectrum
         A wavelength in metres, or several at which light goes the same way.
+    method : {"auto", "facets", "wavefront"}
+        Not the sum of rays, which has no inside of pixels.
 
     Returns
     -------
     (n, n, rows, columns) complex128, n at least 2
         Summed over the components of polarised light.
     """
-    return _padded(mutual_intensity(paths, light, groups=mark.count(paths), method="wavefront"), 2)
+    return _padded(mutual_intensity(paths, light, groups=mark.count(paths), method=method), 2)
 
 
 def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:

@@ -263,11 +263,11 @@ class Interferometer:
             paths = self.trace(light)
             if chosen(paths, self.method) == "rays":  # the fields are kept, too
                 return products(self.fields(light))
-            return arm_mutual_intensity(paths, self.arms.reference, light)
+            return arm_mutual_intensity(paths, self.arms.reference, light, self.method)
         spectrum = self.spectrum(light)
         paths = self.trace(float(spectrum.wavelengths[0]))
-        if needs(self.scene) is None and chosen(paths, self.method) == "wavefront":
-            return arm_mutual_intensity(paths, self.arms.reference, spectrum)
+        if needs(self.scene) is None and chosen(paths, self.method) != "rays":
+            return arm_mutual_intensity(paths, self.arms.reference, spectrum, self.method)
         total = np.zeros((2, 2, *self.ccd.shape), dtype=np.complex128)
         for wavelength, share in zip(spectrum.wavelengths.tolist(), spectrum.weights, strict=True):
             total = add_orders(share * self._mutual(wavelength), total, axes=2)

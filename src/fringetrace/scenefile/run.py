@@ -24,7 +24,7 @@ from fringetrace.core import (
     staged,
     tables,
 )
-from fringetrace.field import chosen, complex_field, irradiance
+from fringetrace.field import choose, complex_field, irradiance
 from fringetrace.geometry import write_height_map
 from fringetrace.instruments import Interferometer, Mark, records, tiff
 from fringetrace.scene import CCD, Beam, Scene
@@ -189,8 +189,9 @@ def _traced(current: Run, wavelength: float) -> Iterator[tuple[str, str]]:
     if every[0].ccd is None:
         return
     for number, paths in enumerate(every):
-        method = chosen(paths, current.method)
-        costs, notes = checks.judge(paths, wavelength, method)
+        choice = choose(paths, current.method)
+        yield "method", str(choice)
+        costs, notes = checks.judge(paths, wavelength, choice.method)
         yield "budget", f"{f'beam {number}' if len(every) > 1 else 'of the image'}: {costs.line}"
         yield from (("note", note) for note in notes)
 

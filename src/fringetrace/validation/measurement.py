@@ -159,7 +159,7 @@ def measure_height(
     Measurement
     """
     # a pixel that is averaged shows a mean of both sides of a step
-    averaged = chosen(bench.trace(wavelength), bench.method) == "wavefront"
+    averaged = chosen(bench.trace(wavelength), bench.method) != "rays"
     bend = STEP * wavelength if averaged else math.inf
     height = bench.height(wavelength, steps)
     both = np.isfinite(height) & np.isfinite(truth)
