@@ -134,6 +134,7 @@ def follow_beam(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int, min_amplit
 
     with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="fringetrace") as pool:
         tables, powers = zip(*pool.map(part, range(len(edges) - 1)), strict=True)
+    del facets, part  # as large as what is to be joined
     return _joined(list(tables), np.sum(powers, axis=0))
 
 
