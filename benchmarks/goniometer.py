@@ -10,17 +10,21 @@ from __future__ import annotations
 import argparse
 import os
 import statistics
+import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
-import pages
 
 import fringetrace as ft
 from fringetrace import degree, nm, um
 from fringetrace.field import spectral_sum
 from fringetrace.scattering import goniometer
 from fringetrace.scattering.rod_lattice import RodLattice
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 ROUNDS = 3
 THETA = np.arange(-60, 61, 20) * degree

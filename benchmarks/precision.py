@@ -7,30 +7,32 @@ python benchmarks/precision.py --write     and write its section of docs/accurac
 from __future__ import annotations
 
 import sys
-
-import pages
+from pathlib import Path
 
 from fringetrace import views
 from fringetrace.validation import work_precision
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 PICTURE = "images/work_precision.png"
 
 SECTION = """## Run time against error
 
-What a method needs for how small an error, on scenes whose field on every pixel is known in closed
-form: made by `benchmarks/precision.py --write`, on your machine by `fringetrace bench`.
+The table shows the run time that each method needs for a given error, on scenes with closed-form fields.
+`benchmarks/precision.py --write` made it; `fringetrace bench` makes it on your machine.
 
-- Phase error: of the mean field of each pixel, absolute, in waves of 632.8 nm, rms over the pixels, each
-  weighted with its irradiance.
+- Phase error: rms over the pixels of the phase error of the mean field, absolute, in waves of 632.8 nm,
+  weighted with the irradiance.
 - Irradiance error: rms over the pixels, relative to the mean. The ray sum squares the mean field, which is
-  less where phases differ within a pixel; and it adds fields by beam area, so that light concentrated g
-  times comes out as g squared (the paraboloid 2.8, the sphere 0.5).
+  too small where phases differ within a pixel. It also adds fields by beam area, so that light concentrated g
+  times counts as g squared (the paraboloid 2.8, the sphere 0.5).
 - Seconds: trace and field, on {cores} cores.
-- "float32" adds up paths in single precision, with Embree's distances, and sums rays.
-- "facets" are the mesh as it is, "form" is the surface that it stands for. The wavefront method's meshes
-  grow with its rays where facets stand for a curved surface: each facet is a plane mirror to it.
+- "float32" sums path lengths in single precision, with Embree's distances, and sums rays.
+- "facets" uses the mesh as it is, "form" the surface behind it. Where facets approximate a curved
+  surface, the meshes of the wavefront method grow with its rays: to it, each facet is a plane mirror.
 
-The most exact run of each:
+The most accurate run of each method:
 
 {table}
 

@@ -96,7 +96,7 @@ def plot(rows: list[dict[str, float]], path: Path) -> None:
         axes.loglog(count, [row[name] for row in rows], "o-", label=name)
     rise = count * np.log(count)
     axes.loglog(count, rows[-1]["waves"] * rise / rise[-1], "k:", label="n log n")
-    axes.set(xlabel="triangles", ylabel="seconds of a core", title="Interferogram of a relief, 512 x 512 pixels")
+    axes.set(xlabel="triangles", ylabel="seconds of a core", title="A relief on 512 x 512 pixels")
     axes.legend()
     figure.savefig(path, dpi=150)
 

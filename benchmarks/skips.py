@@ -19,16 +19,19 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from importlib import import_module
+from pathlib import Path
 from unittest.mock import patch
 
 import numpy as np
-import pages
 import scenes
 
 import fringetrace as ft
 from fringetrace import mm, nm
 from fringetrace.tracing.batch import part
 from fringetrace.tracing.intersect.embree import build
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 WAVE = 633 * nm
 ROUNDS = 5
@@ -470,14 +473,14 @@ def measured(case: Skip, rounds: int = ROUNDS) -> tuple[float, float, str]:
     return on, off, alike
 
 
-SECTION = """## What each skip saves
+SECTION = """## Savings of each skip
 
-The same work with a rule that leaves something out and without it, one thread, made by
-`benchmarks/skips.py --write`: medians of {rounds} runs in turn, {rays} rays.
+Each row compares the same work with and without one skip, on one thread: medians of {rounds} alternating
+runs, {rays} rays, made by `benchmarks/skips.py --write`.
 
-Visibility rays are never shot: shadows are found where sheets end, by rays of the beam itself. Of a
-BRDF that is reciprocal `reciprocal=True` sums half of the table (ray sums are so only as far as their rays
-sample it: no row here).
+Visibility rays are never traced: rays of the beam itself locate shadows where wavefronts end. For a
+reciprocal BRDF, `reciprocal=True` sums half of the table (ray sums are reciprocal only as far as their rays
+sample the sample: no row here).
 
 """
 

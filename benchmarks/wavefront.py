@@ -8,21 +8,23 @@ from __future__ import annotations
 
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
-import pages
 
 import fringetrace as ft
 from fringetrace import mm, nm
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "docs" / "figures"))
+import pages
 
 WAVELENGTH = 633 * nm
 FOCAL, HEIGHT, SIDE, PIXELS = 50 * mm, 20 * mm, 2 * mm, 1024
 
 SECTION = """## A million pixels
 
-A paraboloid seen 30 mm before its focus on 1024 x 1024 pixels, made by
-`benchmarks/wavefront.py --write`. The ray sum has one ray a pixel, and squares how light is concentrated,
-see above.
+A paraboloid is seen 30 mm before its focus on 1024 x 1024 pixels (`benchmarks/wavefront.py --write`). The
+ray sum has one ray per pixel, and squares the concentration of light, see above.
 
 """
 

@@ -30,7 +30,7 @@ def test_hits_are_off_their_facets_by_roundings():
     for form in (None, SPHERE):
         (hits,) = surface_hits(ball(form))
         assert hits.formed.all() == (form is not None)
-        offset = np.linalg.norm(path_errors.off(hits).astype(float), axis=1)
+        offset = np.linalg.norm(path_errors.hit_offsets(hits).astype(float), axis=1)
         assert 0.0 < offset.max() < 4 * EPS
 
 
@@ -39,7 +39,9 @@ def test_a_hit_that_is_off_is_seen():
     (hits,) = surface_hits(paths)
     normal = hits.normal
     lifted = replace(hits, point=hits.point + 5 * nm * normal)
-    np.testing.assert_allclose(path_errors.off(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS)
+    np.testing.assert_allclose(
+        path_errors.hit_offsets(lifted).astype(float), 5 * nm * normal, rtol=0, atol=4 * EPS
+    )
 
 
 FORMS = {
@@ -86,11 +88,11 @@ def test_patches_bend_like_the_ball_they_were_made_for():
 
 def test_facets_leave_out_what_a_form_gives():
     (plain,) = surface_hits(ball(None))
-    height, lean = path_errors.flattened(plain)
+    height, lean = path_errors.flattening(plain)
     assert np.linalg.norm(height, axis=1).max() == pytest.approx(0.1 * 4.528e-3, rel=0.1)
     assert np.linalg.norm(lean, axis=1).max() > 0.05
     (formed,) = surface_hits(ball(SPHERE))
-    assert not np.any(path_errors.flattened(formed))
+    assert not np.any(path_errors.flattening(formed))
 
 
 @pytest.mark.parametrize("longer", [0.0, 3 * nm])

@@ -10,10 +10,10 @@ import pytest
 import fringetrace as ft
 from fringetrace import nm, um
 from fringetrace.geometry import forms, shapes
-from fringetrace.instruments.rig import Rig
+from fringetrace.instruments import Arms, Interferometer, Mark
 from fringetrace.optics import materials, polarisers
 from fringetrace.optics.films import Film
-from fringetrace.optics.materials.dispersion import Table
+from fringetrace.optics.materials.dispersion import IndexTable
 from fringetrace.tracing import optics_table
 from fringetrace.tracing.optics_table import needs, optics, plain, scene_media as media_of
 from fringetrace.tracing.rewavelength import at_wavelength
@@ -310,8 +310,8 @@ def test_branches_to_follow():
 
 
 # Glass whose index is that of air, to so much, at 600 nm; and a film that lets all light of 600 nm through.
-NEAR = materials.Material("near air", Table((0.5, 0.6, 0.7), (1.5, 1.0 + 1e-7, 1.5)))
-LIKE = materials.Material("like air", Table((0.5, 0.59, 0.61, 0.7), (1.5, 1.0, 1.0, 1.5)))
+NEAR = materials.Material("near air", IndexTable((0.5, 0.6, 0.7), (1.5, 1.0 + 1e-7, 1.5)))
+LIKE = materials.Material("like air", IndexTable((0.5, 0.59, 0.61, 0.7), (1.5, 1.0, 1.0, 1.5)))
 QUARTER = Film([(math.sqrt(1.5), 600 * nm / 4 / math.sqrt(1.5))])
 
 
@@ -350,13 +350,13 @@ def test_what_is_dark_is_relative_to_the_light(amplitude):
         at_wavelength(dark, 500 * nm)
 
 
-def test_a_rig_traces_again_where_branches_were_dark():
+def test_an_interferometer_traces_again_where_branches_were_dark():
     """An etalon swept from the wavelength at which its coating is dark is as bright as traced at each."""
     plate = glass.stack([1.0, 1.5], films=[QUARTER])
     beam = ft.Beam((0, 0, 0.01), (0, 0, -1), (0, 1, 0), (1e-3, 1e-3), (8, 8))
     ccd = ft.CCD((0, 0, 0.02), (0, 0, -1), (0, 1, 0), 1e-4, (8, 8))
-    swept = Rig(plate, beam, ccd, 0)
+    swept = Interferometer(plate, beam, ccd, Arms(Mark(0)))
     for wavelength in (600 * nm, 500 * nm, 550 * nm):
-        fresh = Rig(plate, beam, ccd, 0)
+        fresh = Interferometer(plate, beam, ccd, Arms(Mark(0)))
         np.testing.assert_allclose(swept.fields(wavelength), fresh.fields(wavelength), atol=1e-12)
     assert swept.traced == (600 * nm, 500 * nm)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray, FringetraceWarning, checked_wavelength
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, pixel_indices
 from fringetrace.tracing import Paths
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ def aliasing(paths: Paths, wavelength: float) -> str | None:
     ccd = _ccd(paths)
     size = max(1, int(np.ceil(np.sqrt(ENOUGH * ccd.shape[0] * ccd.shape[1] / _rays(paths)))))
     rows, columns = (-(-n // size) for n in ccd.shape)
-    at = np.clip(np.floor(paths.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1) // size
+    at = pixel_indices(ccd, paths.pixel) // size
     part = at[:, 0] * columns + at[:, 1]
     kinds, which = np.unique(paths.key, return_inverse=True)
     if len(kinds) < 2:
@@ -194,7 +194,7 @@ def starvation(paths: Paths) -> str | None:
     """
     ccd = _ccd(paths)
     holes, lit = np.zeros(ccd.shape, dtype=np.bool_), np.zeros(ccd.shape, dtype=np.bool_)
-    row, column = np.clip(np.floor(paths.pixel).astype(np.int64), 0, np.array(ccd.shape) - 1).T
+    row, column = pixel_indices(ccd, paths.pixel).T
     for some in _commonest(paths):
         bright = np.zeros(ccd.shape, dtype=np.bool_)
         bright[row[some], column[some]] = True

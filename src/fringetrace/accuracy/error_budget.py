@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, checked_wavelength
+from fringetrace.core import Array, FloatArray, checked_wavelength, short_repr
 from fringetrace.scene import Beam
 from fringetrace.tracing import Paths, at_wavelength, retrace
 
@@ -64,6 +64,8 @@ class Budget:
     wavelength: float
     method: str
     costliest: tuple[str, float] | None = None
+
+    __repr__ = short_repr
 
     @property
     def total(self) -> float:

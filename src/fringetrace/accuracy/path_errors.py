@@ -11,7 +11,7 @@ from fringetrace.tracing import EXTENDED, Fate, Paths, Segments, SurfaceHits, pa
 
 
 def hit_offsets(hits: SurfaceHits) -> Array:
-    """Rounding of the hits: how far each stands off its facet, or off the form behind it.
+    """Distance of each hit from its facet, or from the exact form behind it.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def hit_offsets(hits: SurfaceHits) -> Array:
 
 
 def flattening(hits: SurfaceHits) -> tuple[FloatArray, FloatArray]:
-    """What facets leave out of the smooth surface that they may stand for; see `geometry.standoff`.
+    """Sag and slope error of facets at hits, against the smooth surface behind; see `geometry.standoff`.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def flattening(hits: SurfaceHits) -> tuple[FloatArray, FloatArray]:
 
 
 def curvature(hits: SurfaceHits) -> FloatArray:
-    """How the normal of the surface turns from place to place: dn = C dp; 0 on facets.
+    """Curvature of the surface at hits: dn = C dp; 0 on facets.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray
 from fringetrace.field import centred, complex_field, reconstruct, reconstruct_facet_waves
-from fringetrace.scene import CCD, Beam, pixels
+from fringetrace.scene import CCD, Beam, crop, pixels
 from fringetrace.tracing import Paths
 
 # Bands of the image that stand for all of it: their middles, in parts of its height, and pixel rows in each.
@@ -34,7 +34,7 @@ def _difference(fields: Sequence[ComplexArray], others: Sequence[ComplexArray]) 
 
 
 def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, int]]:
-    """Rows of pixels that stand for all: some near the lower end, the middle, the upper end.
+    """Bands of pixel rows that represent all: near the lower end, the middle, the upper end.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def sample_bands(shape: tuple[int, int], height: int = ROWS) -> list[tuple[int, 
 
 def _parts(ccd: CCD) -> list[CCD]:
     """Parts of a CCD that stand for all of it, for the ray sum."""
-    return [_cut(ccd, top, stop - top, ccd.shape[1]) for top, stop in sample_bands(ccd.shape, MANY)]
+    return [crop(ccd, top, stop - top, ccd.shape[1]) for top, stop in sample_bands(ccd.shape, MANY)]
 
 
 def _onto(paths: Paths, ccd: CCD) -> Paths:
@@ -64,15 +64,6 @@ def _onto(paths: Paths, ccd: CCD) -> Paths:
     at = pixels(ccd, paths.origin)
     inside = np.asarray(((at >= 0.0) & (at < ccd.shape)).all(axis=1))
     return replace(paths.where(inside), ccd=ccd)
-
-
-def _cut(ccd: CCD, row: int, rows: int, columns: int, size: int = 1) -> CCD:
-    """Rows of a CCD from one on, and columns from the first on; pixels of size x size of its own as one."""
-    u, v, _ = ccd.axes
-    middle_u = 0.5 * (columns - ccd.shape[1]) * ccd.pitch
-    middle_v = (row + 0.5 * (rows - ccd.shape[0])) * ccd.pitch
-    shape = (rows // size, columns // size)
-    return replace(ccd, centre=ccd.centre + middle_u * u + middle_v * v, pitch=ccd.pitch * size, shape=shape)
 
 
 def sampling_error(grids: Sequence[Paths], wavelength: float, steps: float = 0.0) -> float:
@@ -202,7 +193,7 @@ def count_error(paths: Paths, wavelength: float) -> float:
         rows, columns = (n - n % 2 for n in ccd.shape)
         if rows == 0 or columns == 0:
             return 0.0
-        all_ = _onto(seen, _cut(ccd, 0, rows, columns, size=2))
+        all_ = _onto(seen, crop(ccd, 0, rows, columns, binning=2))
         row, column = np.divmod(all_.ray, paths.source.shape[1])
         few = all_.where(_even(row) & _even(column))
         assert few.area is not None

@@ -16,7 +16,15 @@ from cyclopts import App, CycloptsError, Parameter
 
 import fringetrace
 from fringetrace.cli import brdf_commands, scene_commands
-from fringetrace.core import Array, FloatArray, checked_wavelength, parse_angle, parse_length, staged, unit_of
+from fringetrace.core import (
+    Array,
+    FloatArray,
+    checked_wavelength,
+    length_text,
+    parse_angle,
+    parse_length,
+    staged,
+)
 from fringetrace.geometry import Mesh
 
 if TYPE_CHECKING:
@@ -314,8 +322,8 @@ def _say_bench(console: Console, name: str, mesh: Mesh, bench: Interferometer, w
     _say(
         console,
         "bench",
-        f"Michelson, {_length(wavelength)}, image {_length(width)} x {_length(height)}, "
-        f"{columns} x {rows} pixels of {_length(bench.ccd.pitch)}; "
+        f"Michelson, {length_text(wavelength)}, image {length_text(width)} x {length_text(height)}, "
+        f"{columns} x {rows} pixels of {length_text(bench.ccd.pitch)}; "
         f"reference tilted by {bench.arms.tilt[0] * 1e6:.4g} urad: {fringes:.3g} fringes across",
     )
 
@@ -359,11 +367,6 @@ def _say_result(console: Console, bench: Interferometer, measured: Measurement, 
 def _rms(measured: Measurement, where: Array) -> str:
     rms = measured.rms(where)
     return f"{rms * 1e9:.3g} nm = {rms / measured.wavelength:.2g} waves rms"
-
-
-def _length(metres: float) -> str:
-    name, unit = unit_of(metres)
-    return f"{metres / unit:.4g} {name.replace('µ', 'u')}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -48,7 +48,7 @@ SHOWN: tuple[tuple[str, float], ...] = (("m", 1.0), ("mm", 1e-3), ("µm", 1e-6),
 
 
 def filled(values: npt.ArrayLike, dtype: npt.DTypeLike = np.float64) -> Array:
-    """Numbers as an array, NaN where a numpy.ma array masks them.
+    """Numbers as an array, with NaN for masked values of numpy.ma.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def checked_length(value: float, what: str) -> float:
 
 
 def checked_lengths(values: npt.ArrayLike, what: str) -> FloatArray:
-    """Lengths themselves, once they are known to be some.
+    """Checked finite lengths in metres, as an array.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def checked_lengths(values: npt.ArrayLike, what: str) -> FloatArray:
 
 
 def checked_angles(values: npt.ArrayLike, what: str) -> FloatArray:
-    """Angles themselves, once they are known to be finite.
+    """Checked finite angles in radians, as an array.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def checked_angles(values: npt.ArrayLike, what: str) -> FloatArray:
 
 
 def checked_whole(value: int, least: int, what: str) -> int:
-    """A whole number itself, once it is known to be one, as a Python int of any numpy type.
+    """Checked whole number, as a Python int.
 
     Parameters
     ----------

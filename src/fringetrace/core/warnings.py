@@ -1,4 +1,4 @@
-"""The warning class of the package."""
+"""Warning class of the package."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ from .facet_waves import (
     FacetWaves as FacetWaves,
     reconstruct_facet_waves as reconstruct_facet_waves,
 )
+from .field import Field as Field
 from .ray_sum import RaySum as RaySum, centred as centred, products as products
 from .spectral_sum import TOLERANCE as TOLERANCE, spectrum as spectrum
 from .wavefront.wavefronts import Wavefronts as Wavefronts, reconstruct as reconstruct

@@ -18,20 +18,20 @@ from fringetrace.tracing import Paths, at_wavelength, join, needs
 
 
 class PixelLight(Protocol):
-    """PixelLight on the pixels of a CCD, however it is found: what `complex_field` and its kin ask."""
+    """Protocol of light on the pixels of a CCD, by wavefronts or by a ray sum."""
 
     def complex_field(
         self, wavelength: float, groups: npt.ArrayLike | None = None, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """See `complex_field`."""
+        """Complex field, averaged over each pixel; see `complex_field`."""
 
     def irradiance(self, light: float | Spectrum, half_wave_loss: bool = True) -> FloatArray:
-        """See `irradiance`."""
+        """Irradiance, averaged over each pixel; see `irradiance`."""
 
     def mutual_intensity(
         self, light: float | Spectrum, groups: npt.ArrayLike, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """See `mutual_intensity`."""
+        """Mutual intensity, averaged over each pixel; see `mutual_intensity`."""
 
 
 METHODS = ("auto", "facets", "wavefront", "rays")
@@ -269,7 +269,7 @@ def chosen(paths: Paths, method: str) -> str:
 
 
 def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto") -> PixelLight:
-    """The light that paths bring to their CCD, by some method, to be evaluated at a wavelength.
+    """Light of paths on their CCD by a chosen method, to be evaluated at a wavelength.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 
 def grouped(groups: npt.ArrayLike, paths: int) -> npt.NDArray[np.int64]:
-    """The group of each path.
+    """Group of each path.
 
     Parameters
     ----------

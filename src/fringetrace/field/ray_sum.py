@@ -1,4 +1,4 @@
-"""The coherent sum of rays on the pixels, and rays placed at the centre of their part of a pixel."""
+"""Ray sum: coherent sum of rays on the pixels, each at the centre of its part of a pixel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fringetrace.tracing import Paths, components
 
 @dataclass(frozen=True, eq=False)
 class RaySum:
-    """Light on the pixels as the coherent sum E = sum of a exp(2 pi i OPL / wavelength) over rays.
+    """Ray sum on the pixels: E = sum of a exp(2 pi i OPL / wavelength) over rays.
 
     A sum runs in the order of the rays: the same bits for any chunk size.
 
@@ -32,7 +32,7 @@ class RaySum:
     def complex_field(
         self, wavelength: float, groups: npt.ArrayLike | None = None, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """Sum of the rays that fall in each pixel, see `complex_field`.
+        """Complex field: sum of the rays in each pixel, see `complex_field`.
 
         Parameters
         ----------
@@ -66,12 +66,12 @@ class RaySum:
     def mutual_intensity(
         self, light: float | Spectrum, groups: npt.ArrayLike, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """Products E_m conj(E_n) of the fields of groups, see `mutual_intensity`; of one wavelength."""
+        """Mutual intensity E_m conj(E_n) of the ray sums of groups, at one wavelength."""
         assert not isinstance(light, Spectrum)
         return products(self.complex_field(light, groups, half_wave_loss))
 
     def irradiance(self, light: float | Spectrum, half_wave_loss: bool = True) -> FloatArray:
-        """|E|^2 of the sum, see `irradiance`; of one wavelength."""
+        """Irradiance |E|^2 of the ray sum, at one wavelength."""
         assert not isinstance(light, Spectrum)
         squares = np.abs(self.complex_field(light, None, half_wave_loss)) ** 2
         return np.asarray(squares if squares.ndim == 2 else squares.sum(axis=0), dtype=np.float64)
@@ -97,7 +97,7 @@ def _summed(parts: Iterable[Paths], wavelength: float, half_wave_loss: bool) -> 
 
 
 def products(fields: ComplexArray) -> ComplexArray:
-    """E_m conj(E_n) of fields, summed over the components of light with a polarisation.
+    """Products E_m conj(E_n) of fields, summed over the components of polarised light.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Sample points on the pixels: how many a fringe needs, where they lie, and means over them."""
+"""Sample points on the pixels: their number, their positions, and means over them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, short_repr
 
 # Gauss points a pixel, along either axis: at least LEAST, for the curvature of a smooth irradiance.
 LEAST, MOST = 2, 32
@@ -30,7 +30,7 @@ BAND = 1 << 18
 
 
 def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
-    """Gauss points that integrate so many cycles of a wave over an interval.
+    """Number of Gauss points that integrate so many cycles of a wave over an interval.
 
     n points miss exp(i pi c u) over -1 < u < 1 by about (e pi c / 4 n)^2n (remainder of the Gauss
     rule, with Stirling's formula).
@@ -51,7 +51,7 @@ def gauss_order(cycles: FloatArray) -> npt.NDArray[np.int64]:
 
 
 def gauss_table(orders: Array) -> tuple[FloatArray, FloatArray]:
-    """Nodes and weights on [0, 1] of the Gauss-Legendre rules.
+    """Nodes and weights of the Gauss-Legendre rules on [0, 1].
 
     Parameters
     ----------
@@ -88,30 +88,36 @@ class Samples:
     where_x: FloatArray
     where_y: FloatArray
 
+    __repr__ = short_repr
+
     def blank(self, groups: int) -> ComplexArray:
-        """No light yet: (groups, points) zeros."""
+        """Zero field at the sample points, (groups, points)."""
         return np.zeros((groups, len(self.x)), dtype=np.complex128)
 
-    def means(self, field: ComplexArray) -> ComplexArray:
-        """Means of fields (groups, points) over each pixel of the band, (groups, rows, columns)."""
+    def add_means(
+        self, field: ComplexArray, where: npt.NDArray[np.bool_], weight: float, products: bool,
+        total: ComplexArray,
+    ) -> None:  # fmt: skip
+        """Add means over some pixels of the band to images.
+
+        Parameters
+        ----------
+        field : (groups, points) complex128
+        where : (rows, columns) bool
+        weight : float
+        products : bool
+            Means of E_m conj(E_n) instead of those of the fields.
+        total : (groups, rows, columns) complex128, or (groups**2, rows, columns)
+        """
         from fringetrace.field import pixel_kernels
 
-        mean = np.empty((len(field), len(self.first) - 1), dtype=np.complex128)
-        pixel_kernels.means(self.first, self.weight, field, mean)
-        return mean.reshape(len(field), -1, self.columns)
-
-    def products(self, field: ComplexArray) -> ComplexArray:
-        """Means of E_m conj(E_n) of fields (groups, points), (groups, groups, rows, columns)."""
-        from fringetrace.field import pixel_kernels
-
-        mutual = np.empty((len(field), len(field), len(self.first) - 1), dtype=np.complex128)
-        pixel_kernels.products(self.first, self.weight, field, mutual)
-        return mutual.reshape(len(field), len(field), -1, self.columns)
+        add = pixel_kernels.add_mean_products if products else pixel_kernels.add_means
+        add(self.first, self.weight, field, where, weight, total)
 
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Segments that edges of sheets draw on the pixels.
+    """Edges of wavefronts as line segments on the pixels.
 
     Attributes
     ----------
@@ -130,9 +136,11 @@ class Edges:
     begin: npt.NDArray[np.int64]
     lines: npt.NDArray[np.int64]
 
+    __repr__ = short_repr
+
 
 def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
-    """Which segments cross which pixels.
+    """Pixels that each segment crosses.
 
     Parameters
     ----------
@@ -153,7 +161,7 @@ def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:
 
 
 def samples(order: npt.NDArray[np.int64], top: int, cuts: Edges | None = None) -> Samples:
-    """Points of a band of pixels: Gauss points, or, where edges cross, points of the pieces.
+    """Sample points of a band of pixels: Gauss points, or points of the pieces where edges cross.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The light of each arm on the pixels of an interferometer, from traced paths."""
+"""Light of each arm on the pixels of an interferometer, from traced paths."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from fringetrace.core import ComplexArray
 from fringetrace.field import centred, chosen, complex_field, mutual_intensity
 from fringetrace.instruments.arms import Mark
-from fringetrace.scene import Beam
+from fringetrace.scene import Beam, Spectrum
 from fringetrace.tracing import Paths
 
 
 def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> ComplexArray:
-    """Mean fields on the pixels, one for each count of a mark.
+    """Mean fields on the pixels, one per count of a mark.
 
     Parameters
     ----------
@@ -33,13 +33,15 @@ def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> Comp
     return _padded(fields, 1)
 
 
-def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float, method: str) -> ComplexArray:
-    """Mean over each pixel of E_m conj(E_n), for the light of each count of a mark.
+def arm_mutual_intensity(paths: Paths, mark: Mark, light: float | Spectrum, method: str) -> ComplexArray:
+    """Mutual intensity of the counts of a mark, averaged over each pixel.
 
     Parameters
     ----------
-    paths, mark, wavelength
+    paths, mark
         See `arm_fields`.
+    light : float or Spectrum
+        A wavelength in metres, or several at which light goes the same way.
     method : {"auto", "facets", "wavefront"}
         Not the sum of rays, which has no inside of pixels.
 
@@ -48,11 +50,11 @@ def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float, method: st
     (n, n, rows, columns) complex128, n at least 2
         Summed over the components of polarised light.
     """
-    return _padded(mutual_intensity(paths, wavelength, groups=mark.count(paths), method=method), 2)
+    return _padded(mutual_intensity(paths, light, groups=mark.count(paths), method=method), 2)
 
 
 def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
-    """Fields by count of a mark as sums of rays, each at the centre of its part of a pixel, see `centred`.
+    """Fields by count of a mark as ray sums, each ray at the centre of its part of a pixel, see `centred`.
 
     Parameters
     ----------
@@ -75,7 +77,7 @@ def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
 
 
 def add_orders(one: ComplexArray, other: ComplexArray, axes: int = 1) -> ComplexArray:
-    """Sum of two arrays of light that may have different numbers of counts along their first axes.
+    """Sum of two arrays of light with different numbers of counts along their first axes.
 
     Parameters
     ----------

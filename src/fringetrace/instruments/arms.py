@@ -1,4 +1,4 @@
-"""The arms of an interferometer: which light a phase step turns, and how a tilted reference rises."""
+"""Arms of an interferometer: which light a phase step shifts, and the slope of a tilted reference."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, wavenumber
+from fringetrace.core import ComplexArray, FloatArray, short_repr, wavenumber
 from fringetrace.scene import CCD, pixel_centres
 from fringetrace.tracing import Paths
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Mark:
-    """What tells the arms of an interferometer apart: how often light met a surface.
+    """Marker of an arm: how often light met a surface.
 
     Parameters
     ----------
@@ -38,6 +38,8 @@ class Mark:
     branch: int | None = None
     then: int | None = None
     sense: int = 1
+
+    __repr__ = short_repr
 
     def count(self, paths: Paths) -> npt.NDArray[np.int64]:
         """Number of times each path met the marked surface.
@@ -91,7 +93,7 @@ def path_slope(tilt: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Arms:
-    """The reference arm and the sample's arm of an interferometer.
+    """Reference arm and sample arm of an interferometer.
 
     Parameters
     ----------
@@ -110,8 +112,10 @@ class Arms:
     sample: int | None = None
     immersion: Material | None = None
 
+    __repr__ = short_repr
+
     def phasors(self, step: float, orders: int) -> ComplexArray:
-        """Factors by which a phase step multiplies the light of each count of the reference's mark.
+        """Factors exp(i m delta) by which a phase step multiplies the light of each count m of the mark.
 
         Parameters
         ----------
@@ -157,7 +161,7 @@ class Arms:
         return 1.0 if self.immersion is None else complex(self.immersion.index(wavelength)).real
 
     def carrier(self, ccd: CCD, wavelength: float) -> FloatArray:
-        """Phase of the tilted reference wave over the pixels, 0 at the centre of the image.
+        """Carrier phase of the tilted reference wave over the pixels, 0 at the centre of the image.
 
         A plane wave off a plane mirror turned by a: its path on the CCD rises by sin 2a a metre
         along the tilt, exactly (times the index of the immersion).

@@ -46,7 +46,7 @@ def fizeau(
     method: str = "auto",
     design: float = DESIGN,
 ) -> Interferometer:
-    """A Fizeau interferometer: a glass plate over the sample, its lower face the reference.
+    """Fizeau interferometer: a glass plate above the sample, its lower face the reference.
 
     Light comes down through the plate; what the reference face sends back interferes with what comes back
     from the sample, once or after several round trips in the gap: Airy's fringes, as narrow as both

@@ -1,4 +1,4 @@
-"""The interferometer: a scene, its beam, its CCD and its arms; what is traced, recorded and found with it."""
+"""Interferometer: a scene with beam, CCD and arms; traced once, then recorded at any wavelength."""
 
 from __future__ import annotations
 
@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fringetrace.accuracy import Budget, budget, checks
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_wavelength
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    checked_wavelength,
+    described,
+    length_text,
+    value_text,
+)
 from fringetrace.field import chosen, products
 from fringetrace.instruments import records
 from fringetrace.instruments.arm_light import add_orders, arm_fields, arm_mutual_intensity, ray_sums
@@ -34,7 +42,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True, eq=False)
 class Interferometer:
-    """An interferometer: a scene lit by one beam, seen by one CCD, with a reference arm and a sample's arm.
+    """Interferometer: a scene lit by one beam, seen by one CCD, with a reference and a sample arm.
 
     It is traced once; wavelengths and phase steps then re-use the paths. Where media bend or split light
     another way at another wavelength, it is traced once a wavelength (the last one is kept): `traced` says
@@ -70,6 +78,20 @@ class Interferometer:
     # the paths once traced, at which wavelengths, and the light of the last one
     derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
 
+    def __repr__(self) -> str:
+        names = [value_text(surface.name) for surface in self.scene.surfaces]
+        (rows, columns), (across, along) = self.ccd.shape, self.beam.shape
+        tilt = ", ".join(f"{1e6 * angle:.4g}" for angle in self.arms.tilt)
+        at = ", ".join("any wavelength" if one is None else length_text(one) for one in self.traced)
+        turned = f" tilted by ({tilt}) urad" if any(self.arms.tilt) else ""
+        return described(
+            self,
+            f"reference {names[self.arms.reference.surface]}{turned}",
+            "" if self.arms.sample is None else f"sample {names[self.arms.sample]}",
+            f"{columns} x {rows} pixels of {length_text(self.ccd.pitch)}, {along} x {across} rays",
+            f"traced at {at}" if self.traced else "not traced",
+        )
+
     def __post_init__(self) -> None:
         count = len(self.scene.surfaces)
         for what, number in (("reference", self.arms.reference.surface), ("sample", self.arms.sample)):
@@ -81,7 +103,7 @@ class Interferometer:
 
     @property
     def traced(self) -> tuple[float | None, ...]:
-        """Wavelengths (metres) that it has been traced at, one after the other; None: one trace for all."""
+        """Wavelengths (metres) of the traces so far; None: one trace for all wavelengths."""
         return tuple(self.derived.get("traced", ()))
 
     def trace(
@@ -91,7 +113,7 @@ class Interferometer:
         progress: Progress | None = None,
         threads: int | None = None,
     ) -> Paths:
-        """All paths from the beam, traced at the first call and kept.
+        """Trace all paths at the first call, and keep them.
 
         Parameters
         ----------
@@ -125,7 +147,7 @@ class Interferometer:
         return served
 
     def sampled(self, shape: tuple[int, int], wavelength: float | None = None) -> Paths:
-        """Paths of a coarser grid of rays over the same beam, with their polylines, to look at.
+        """Recorded paths of a coarser ray grid over the same beam, for drawing.
 
         Parameters
         ----------
@@ -144,7 +166,7 @@ class Interferometer:
         )  # fmt: skip
 
     def shut(self, arm: str) -> Interferometer:
-        """The same interferometer with a black shutter in one arm, where its light ends.
+        """The interferometer with a shutter in one arm, whose light ends there.
 
         Parameters
         ----------
@@ -166,7 +188,7 @@ class Interferometer:
         return replace(self, scene=replace(self.scene, surfaces=tuple(surfaces)))
 
     def reach(self, wavelength: float) -> float:
-        """Largest difference between the optical paths of any light on the CCD.
+        """Largest optical path difference between any light on the CCD.
 
         Parameters
         ----------
@@ -180,7 +202,7 @@ class Interferometer:
         return float(np.ptp(length)) if len(length) else 0.0
 
     def spectrum(self, light: Light) -> Spectrum:
-        """The wavelengths that stand for light.
+        """Discrete spectrum that represents the light.
 
         Parameters
         ----------
@@ -201,7 +223,7 @@ class Interferometer:
         return Spectrum(np.array([checked_wavelength(light)]), np.ones(1))
 
     def fields(self, wavelength: float) -> ComplexArray:
-        """Mean fields on the pixels, one for each count of the reference's mark.
+        """Mean fields on the pixels, one per count of the reference's mark.
 
         Parameters
         ----------
@@ -221,7 +243,7 @@ class Interferometer:
         return self._kept(wavelength, "fields", find)
 
     def mutual(self, light: Light) -> ComplexArray:
-        """Mutual intensities on the pixels of the light with m and n counts of the reference's mark.
+        """Mutual intensities on the pixels of light with m and n counts of the reference's mark.
 
         Parameters
         ----------
@@ -243,6 +265,9 @@ class Interferometer:
                 return products(self.fields(light))
             return arm_mutual_intensity(paths, self.arms.reference, light, self.method)
         spectrum = self.spectrum(light)
+        paths = self.trace(float(spectrum.wavelengths[0]))
+        if needs(self.scene) is None and chosen(paths, self.method) != "rays":
+            return arm_mutual_intensity(paths, self.arms.reference, spectrum, self.method)
         total = np.zeros((2, 2, *self.ccd.shape), dtype=np.complex128)
         for wavelength, share in zip(spectrum.wavelengths.tolist(), spectrum.weights, strict=True):
             total = add_orders(share * self._mutual(wavelength), total, axes=2)
@@ -263,7 +288,7 @@ class Interferometer:
     def stream_fields(
         self, wavelength: float, *, progress: Progress | None = None, threads: int | None = None
     ) -> ComplexArray:
-        """`fields` by ray sum, while tracing: no path is kept, so memory does not grow with the rays.
+        """Fields by ray sum while tracing; memory does not grow with the number of rays.
 
         Parameters
         ----------
@@ -330,7 +355,7 @@ class Interferometer:
         return np.sqrt(image) if modulus else image
 
     def phase_steps(self, light: Light, steps: int = 4) -> FloatArray:
-        """Frames of a phase-stepped recording: frame k adds 2 pi k / steps to the reference.
+        """Phase-stepped frames: frame k adds 2 pi k / steps to the phase of the reference.
 
         Parameters
         ----------
@@ -356,11 +381,11 @@ class Interferometer:
         return self._kept(light, f"{steps} steps", frames).copy()
 
     def carrier(self, wavelength: float) -> FloatArray:
-        """Phase of the tilted reference wave over the pixels, see `Arms.carrier`: (rows, columns) float64."""
+        """Carrier phase of the tilted reference wave, see `Arms.carrier`: (rows, columns) float64."""
         return self.arms.carrier(self.ccd, wavelength)
 
     def wrapped(self, wavelength: float, steps: int = 4) -> FloatArray:
-        """Phase by which the reference leads the sample, from phase-stepped frames, wrapped.
+        """Wrapped phase of the reference relative to the sample, from phase-stepped frames.
 
         Parameters
         ----------
@@ -375,7 +400,7 @@ class Interferometer:
         return wrapped_phase(self.phase_steps(wavelength, steps), self.mutual(wavelength))
 
     def path_difference(self, wavelength: float, steps: int = 4) -> FloatArray:
-        """Optical path that the sample adds to its arm: phase steps, carrier off, unwrapped.
+        """Optical path that the sample adds to its arm, from phase steps, unwrapped.
 
         Parameters
         ----------

@@ -43,7 +43,7 @@ def jamin_lebedeff(
     method: str = "auto",
     design: float = SODIUM,
 ) -> Interferometer:
-    """A Jamin-Lebedeff interferometer: polarised, both beams through the same plates side by side.
+    """Jamin-Lebedeff interferometer: two polarised beams side by side through the same plates.
 
     Light along +z, polarised at 45 degrees, meets a shear plate, a half-wave plate (which swaps the two
     polarisations), the sample, a second shear plate like the first, the analyser. The ordinary beam goes

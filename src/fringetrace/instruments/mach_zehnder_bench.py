@@ -38,7 +38,7 @@ def mach_zehnder(
     method: str = "auto",
     design: float = DESIGN,
 ) -> Interferometer:
-    """A Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
+    """Mach-Zehnder interferometer with a transparent sample in one arm, such as a cell.
 
     Light goes through the sample along +z; the camera looks back at it, its columns along x and its rows
     along y, focused on a plane inside of the sample: rays are carried back to it along the lines on which

@@ -55,7 +55,7 @@ def michelson(
     focus: bool = True,
     method: str = "auto",
 ) -> Interferometer:
-    """A Michelson (Twyman-Green) interferometer with the sample in one arm.
+    """Michelson (Twyman-Green) interferometer with the sample in one arm.
 
     The splitter stands at the origin at 45 degrees. The source at (-arm, 0, 0) fires along +x;
     half of the light goes down to the sample at (0, 0, -arm), half on to the reference mirror

@@ -1,4 +1,4 @@
-"""What a camera records of two arms, and what phase steps tell: arrays in, arrays out."""
+"""Recorded irradiance of two arms, phase steps, and the optical path difference; arrays in, arrays out."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def phase_shifts(steps: int) -> FloatArray:
-    """Phases that are added to the reference, frame by frame: a period in equal steps.
+    """Phase steps of the reference, frame by frame: equal steps over a period.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ def phase_shifts(steps: int) -> FloatArray:
 
 
 def step_axis(steps: int) -> Coordinates:
-    """The axis of phase-stepped frames, labelled, radians."""
+    """Axis of phase-stepped frames, labelled, radians."""
     return {"step": (phase_shifts(steps), "rad")}
 
 
 def recorded(mutual: ComplexArray, arms: Arms, step: float) -> FloatArray:
-    """Irradiance on the pixels, with a phase step on the reference.
+    """Irradiance on the pixels with a phase step on the reference.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def recorded(mutual: ComplexArray, arms: Arms, step: float) -> FloatArray:
 
 
 def wrapped_phase(frames: FloatArray, mutual: ComplexArray) -> FloatArray:
-    """Phase by which the reference leads the sample, from phase-stepped frames, wrapped.
+    """Wrapped phase of the reference relative to the sample, from phase-stepped frames.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def wrapped_phase(frames: FloatArray, mutual: ComplexArray) -> FloatArray:
 
 
 def path_difference(wrapped: FloatArray, carrier: FloatArray, wavelength: float) -> FloatArray:
-    """Optical path of the sample's arm less that of the reference: the carrier taken off, unwrapped, scaled.
+    """Optical path difference of the sample arm and the reference: carrier removed, unwrapped, scaled.
 
     Parameters
     ----------

@@ -35,5 +35,14 @@ from .interfaces import (
 from .materials.material import Material as Material
 from .materials.named_materials import VACUUM as VACUUM, as_material as as_material
 from .phase_plates import PhasePlate as PhasePlate
+from .polarisation import (
+    JONES as JONES,
+    Polarisation as Polarisation,
+    PolarisationLike as PolarisationLike,
+    PolarisationName as PolarisationName,
+    check_polarisation as check_polarisation,
+    checked_jones as checked_jones,
+    jones_states as jones_states,
+)
 from .polarisers import Polariser as Polariser, Retarder as Retarder, wave_plate as wave_plate
 from .pupils import Pupil as Pupil

@@ -14,7 +14,15 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_direction, checked_vector, dot
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    dot,
+    short_repr,
+)
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -113,6 +121,8 @@ class ShearPlate:
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "ShearPlate axis"))
@@ -229,6 +239,8 @@ class Wollaston:
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Wollaston centre"))

@@ -23,6 +23,7 @@ from fringetrace.core import (
     checked_vector,
     component,
     dot,
+    short_repr,
 )
 
 # An axis nearer to a ray than its own rounding has no direction across it.
@@ -59,6 +60,8 @@ class IncidentRays:
     field: ComplexArray
     wavelength: float | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Branch:
@@ -80,6 +83,8 @@ class Branch:
     point: FloatArray | None = None
     path: FloatArray | None = None
 
+    __repr__ = short_repr
+
 
 class Element(Protocol):
     """Protocol of thin elements that send rays on in a fixed number of branches.
@@ -90,7 +95,7 @@ class Element(Protocol):
 
     @property
     def waves(self) -> Waves:
-        """What becomes of plane waves: they stay plane, get curved, or are torn."""
+        """Effect on plane waves: they stay plane, get curved, or are torn."""
 
     @property
     def branches(self) -> int:
@@ -287,6 +292,8 @@ class Annulus:
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Annulus centre"))
         radii = (self.inner, self.outer)
@@ -343,6 +350,8 @@ class IdealLens:
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "IdealLens centre"))

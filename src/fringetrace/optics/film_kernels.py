@@ -14,13 +14,13 @@ ASLANT = 1e-9
 
 
 def normal_part(index: ComplexArray, theta: FloatArray) -> ComplexArray:
-    """N cos(theta), for `stacks`: 0 at the float pi/2, which is a little less than a right angle."""
+    """Normal component N cos(theta) for `stacks`; 0 at the float pi/2, slightly below a right angle."""
     return index * np.where(theta < 0.5 * math.pi, np.cos(theta), 0.0)
 
 
 @jit
 def layer_matrix(square, thickness, k0):
-    """Matrix of a layer, times p = exp(i k0 kz d): its diagonal, i sin / kz, i kz sin, and p.
+    """Characteristic matrix of a layer, times p = exp(i k0 kz d): diagonal, i sin / kz, i kz sin, and p.
 
     From kz^2, in terms of p, which cannot overflow, and of a quotient that stays finite at kz = 0.
     """
@@ -39,7 +39,7 @@ def layer_matrix(square, thickness, k0):
 
 @part
 def answered(q, field, across):
-    """Reflected and transmitted amplitude of a wave of normal part q, from what it finds (E and H, or so)."""
+    """Reflection and transmission amplitudes of a wave of normal component q, from E and H at the stack."""
     whole = q * field + across
     if whole == 0.0:  # a wave along a film of its own medium
         return 0j, 1.0 / field
@@ -48,7 +48,7 @@ def answered(q, field, across):
 
 @jit
 def stack_amplitudes(q1, first, layers, thickness, last, k0):
-    """Amplitudes (rs, rp, ts, tp) of a stack of layers between two half spaces.
+    """Amplitudes (rs, rp, ts, tp) of a thin-film stack between two half-spaces.
 
     q1 = n cos(theta) is the normal part of the wave vector before the stack, over k0; `first`,
     `last` and `layers` (m,) are complex indices, in the order that light meets them; `thickness`
@@ -79,7 +79,7 @@ def stack_amplitudes(q1, first, layers, thickness, last, k0):
 
 @jit
 def power_factors(q1, first, last):
-    """Power across a face or film for |t|^2 = 1, of s and of p light: T = power_factors * |t|^2.
+    """Power transmittance for |t|^2 = 1, of s and p light: T = power_factors * |t|^2.
 
     The normal part of the Poynting vector behind, by that before; T = 0 where light is totally
     reflected, or runs along the face. If the first half space absorbs, R + T is not the whole
@@ -114,7 +114,7 @@ def shares(q1, first, last):
 
 @part
 def forward(squared):
-    """Normal part of a wave vector from its square: the root that runs, or fades, forwards.
+    """Normal wave-vector component from its square: the root that propagates or decays forwards.
 
     Waves that come out of an absorbing medium may grow along the normal, as they are damped along the
     face: the branch with Re + Im > 0 is the one that goes on into that of a transparent medium.
@@ -145,7 +145,7 @@ def face_amplitudes(first, q1, last, q2):
 
 @part
 def clear(first, last, q):
-    """`bare` between media that do not absorb, from the real normal part before: real, but for phases."""
+    """Power amplitudes like `bare` between transparent media, from the real normal component before."""
     square = (last - first) * (last + first) + q * q
     deep = np.sqrt(abs(square))
     a, b = last * last * q, first * first * deep
@@ -161,7 +161,7 @@ def clear(first, last, q):
 
 @part
 def aslant(first, q1):
-    """Whether a wave fades along the boundary: never between parallel faces.
+    """Whether a wave decays along the boundary; never between parallel faces.
 
     As an endless wave it might bring power along that is not in it; rays are to keep theirs.
     """
@@ -170,7 +170,7 @@ def aslant(first, q1):
 
 @part
 def bounded(r, t):
-    """Amplitudes of power with no more power than came; what is reflected goes first."""
+    """Power amplitudes limited to the incident power, the reflected one first."""
     size = r.real * r.real + r.imag * r.imag
     rest, through = 1.0 - size, t.real * t.real + t.imag * t.imag
     if rest <= 0.0:
@@ -180,7 +180,7 @@ def bounded(r, t):
 
 @part
 def bare(first, last, q1):
-    """Amplitudes of power of a bare boundary, r_s, r_p, t_s, t_p, and the normal part behind."""
+    """Power amplitudes r_s, r_p, t_s, t_p of a bare boundary, and the normal component behind it."""
     if first == last:
         return 0j, 0j, 1.0 + 0j, 1.0 + 0j, q1
     if first.imag == 0.0 and last.imag == 0.0 and q1.imag == 0.0 and q1.real > 0.0:
@@ -196,13 +196,13 @@ def bare(first, last, q1):
 
 @part
 def beneath(first, last, q1):
-    """Normal part of the wave vector behind a boundary."""
+    """Normal wave-vector component behind a boundary."""
     return q1 if first == last else forward((last - first) * (last + first) + q1 * q1)
 
 
 @part
 def powers(first, q1, last, q2):
-    """From amplitudes of E behind a boundary to those of power, of s and of p light."""
+    """Power amplitudes from amplitudes of E behind a boundary, of s and p light."""
     s, p = flow(first, q1)
     through_s, through_p = flow(last, q2)
     return shared(through_s, s), shared(through_p, p)
@@ -210,7 +210,7 @@ def powers(first, q1, last, q2):
 
 @jit
 def coated(film, surface, front, first, last, q1, k0):
-    """`bare` of a boundary with a film on it, met from the front or from the back."""
+    """Power amplitudes of a boundary with a film on it, met from the front or from the back."""
     q2 = beneath(first, last, q1)
     begin, indices, thickness, backwards = film
     a, b = begin[surface], begin[surface + 1]

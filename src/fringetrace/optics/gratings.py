@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction, checked_vector, dot
+from fringetrace.core import FloatArray, checked_direction, checked_vector, dot, short_repr
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -98,6 +98,8 @@ class Grating:
     waves: ClassVar[Waves] = "plane"
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Grating axis"))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from fringetrace.core import FloatArray
+from fringetrace.core import FloatArray, short_repr
 
 if TYPE_CHECKING:
     from fringetrace.optics.films import Film
@@ -55,6 +55,8 @@ class Mirror:
     """
 
     reflectance: float = 1.0
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         _checked_fraction(self.reflectance, "Mirror reflectance")
@@ -108,6 +110,8 @@ class BeamSplitter:
     reflection: complex = 1j / math.sqrt(2.0)
     transmission: complex = complex(1.0 / math.sqrt(2.0))
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         r, t = self.reflection, self.transmission
         if not all(isinstance(a, Complex) and cmath.isfinite(a) for a in (r, t)):
@@ -156,6 +160,8 @@ class Dielectric:
 
     follow: str = "both"
     film: Film | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if self.follow not in FOLLOWED:

@@ -14,7 +14,16 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, filled, frame
+from fringetrace.core import (
+    ROUNDED,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    component,
+    filled,
+    frame,
+    short_repr,
+)
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -43,6 +52,8 @@ class FormulaRelief:
     gradient: Slopes | None
     step: float | None
 
+    __repr__ = short_repr
+
     def __call__(self, x: FloatArray, y: FloatArray) -> Relief:
         """Path in metres, and its gradient, at points in metres."""
         if self.gradient is not None:
@@ -61,6 +72,8 @@ class PixelRelief:
     pitch: float
     fold: float | None
 
+    __repr__ = short_repr
+
     def __call__(self, x: FloatArray, y: FloatArray) -> Relief:
         """Path in metres, modulo the fold if there is one, and a gradient of 0."""
         rows, columns = self.samples.shape
@@ -77,6 +90,8 @@ class SplineRelief:
 
     samples: FloatArray
     pitch: float
+
+    __repr__ = short_repr
 
     @cached_property
     def fit(self) -> Any:
@@ -150,6 +165,8 @@ class PhasePlate:
 
     polarised: ClassVar[bool] = False
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "PhasePlate centre"))
         right, up = _plane_axes(self.right, self.up)
@@ -192,7 +209,7 @@ class PhasePlate:
 
     @property
     def waves(self) -> Waves:
-        """What becomes of plane waves: pixels tear them, smooth maps curve them."""
+        """Effect on plane waves: pixels tear them, smooth maps curve them."""
         return "torn" if isinstance(self.relief, PixelRelief) else "curved"
 
     @property
@@ -247,6 +264,8 @@ class Focusing:
     focal_length: float
     object_distance: float
     index: float
+
+    __repr__ = short_repr
 
     @property
     def distances(self) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, filled
+from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, filled, short_repr
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -60,6 +60,8 @@ class Polariser:
     polarised: ClassVar[bool] = True
     chromatic: ClassVar[bool] = False
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Polariser axis"))
         if not 0.0 <= checked_number(self.extinction, "Polariser extinction") <= 1.0:
@@ -102,6 +104,8 @@ class Retarder:
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Retarder axis"))
@@ -171,6 +175,8 @@ class Birefringence:
     extraordinary: RealIndex
     thickness: float
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         checked_index(self.ordinary, "Birefringence ordinary index")
         checked_index(self.extraordinary, "Birefringence extraordinary index")
@@ -226,6 +232,8 @@ class JonesPlate:
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrix", _checked_matrix(self.matrix))

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction, dot
+from fringetrace.core import FloatArray, checked_direction, dot, short_repr
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
@@ -45,6 +45,8 @@ class Pupil:
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Pupil axis"))

@@ -1,4 +1,4 @@
-"""Ratios of Bessel functions of neighbouring orders, where the functions themselves underflow or overflow."""
+"""Bessel functions: ratios of neighbouring orders, where the functions underflow or overflow."""
 
 from __future__ import annotations
 

@@ -17,4 +17,9 @@ from .goniometer import (
 )
 from .illumination import Illumination as Illumination, footprint as footprint
 from .rod_lattice import RodLattice as RodLattice
-from .rod_studies import Polarised as Polarised, cluster as cluster, specular as specular, study as study
+from .rod_solvers import (
+    lattice_cylinders as lattice_cylinders,
+    lattice_gratings as lattice_gratings,
+    lattice_validity as lattice_validity,
+)
+from .rod_studies import cluster as cluster, specular as specular, study as study

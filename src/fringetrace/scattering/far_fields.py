@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelengths
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelengths, short_repr
 from fringetrace.field import TOLERANCE, spectrum
 from fringetrace.scattering.detectors import Detector, Pixels, fraunhofer_paths, sides, towards
 from fringetrace.scattering.illumination import Illumination
@@ -43,6 +43,8 @@ class Far:
     rays: npt.NDArray[np.int64]
     shares: dict[str, float]
     incident: float
+
+    __repr__ = short_repr
 
 
 def _shares(paths: Paths) -> FloatArray:

@@ -11,15 +11,14 @@ import numpy.typing as npt
 
 from fringetrace.accuracy import hit_error
 from fringetrace.core import FloatArray, FringetraceWarning, array, checked_wavelengths
+from fringetrace.optics import PolarisationLike, jones_states
 from fringetrace.scattering.detectors import Cells, Cones, Detector, Pixels, checked_angles
 from fringetrace.scattering.far_fields import FATES, Far, far_field, mean
 from fringetrace.scattering.illumination import (
     Illumination,
-    Polarisation,
     SourceFunction,
     footprint,
     scene_validity,
-    states,
 )
 from fringetrace.scene import Scene
 from fringetrace.tracing import Fate, needs, trace
@@ -117,7 +116,7 @@ def amplitudes(
     rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
     source: SourceFunction | None = None,
-    polarisation: Polarisation = None,
+    polarisation: PolarisationLike = None,
     **options: Any,
 ) -> DataArray:
     """Complex far-field amplitudes from each direction into each: the BRDF before squaring.
@@ -143,7 +142,7 @@ def amplitudes(
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
     lighting = Illumination(scene, aperture, rays, centre, source)
-    lights = states(polarisation, (len(theta), len(phi)))
+    lights = jones_states(polarisation, (len(theta), len(phi)), "goniometer")
     if len(lights[0]) > 1:
         raise ValueError(f"amplitudes polarisation: expected one state of light, got {polarisation!r}")
     pairs = [(t, p) for t in theta for p in phi]
@@ -171,7 +170,7 @@ def brdf(
     rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
     source: SourceFunction | None = None,
-    polarisation: Polarisation = None,
+    polarisation: PolarisationLike = None,
     reciprocal: bool = False,
     progress: Callable[[int, int], None] | None = None,
     **options: Any,
@@ -249,7 +248,7 @@ def brdf(
     if method == "diffraction":
         _check_spacing(lighting, waves)
     pairs = [(t, p) for t in theta for p in phi]
-    lights = states(polarisation, (len(theta), len(phi)))
+    lights = jones_states(polarisation, (len(theta), len(phi)), "goniometer")
     if reciprocal:
         _check_same(theta, phi, detector)
         if polarisation is not None and len(lights[0]) == 1:

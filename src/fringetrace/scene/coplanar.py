@@ -1,4 +1,4 @@
-"""Facets that lie in one plane, told apart from those that only nearly do."""
+"""Coplanar facets of a mesh, distinguished from nearly coplanar ones."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Parts = npt.NDArray[np.int64]
 
 
 def planes(corners: FloatArray) -> Parts:
-    """The plane that each facet of a mesh lies in.
+    """Number of the plane in which each facet of a mesh lies.
 
     Parameters
     ----------

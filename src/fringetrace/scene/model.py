@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy.typing as npt
 
+from fringetrace.core import described, value_text
 from fringetrace.geometry import Mesh, as_mesh
 from fringetrace.optics import Dielectric, Interface, Metal
 
@@ -22,6 +23,10 @@ def _medium(value: Any, what: str) -> Material | None:
     from fringetrace.optics import as_material
 
     return as_material(value, what)
+
+
+# Surfaces of a scene that its representation names.
+NAMED_SURFACES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +61,12 @@ class Surface:
     front: Material | None = None
     back: Material | None = None
 
+    def __repr__(self) -> str:
+        media = (f"{side} {m.name}" for side in ("front", "back") if (m := getattr(self, side)) is not None)
+        form = "" if self.form is None else f"exact {type(self.form).__name__}"
+        triangles = f"{len(self.mesh.faces):,} triangles"
+        return described(self, value_text(self.name), value_text(self.interface), triangles, form, *media)
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", as_mesh(self.mesh, self.name))
         constant = all(hasattr(self.interface, name) for name in ("reflection", "transmission"))
@@ -75,7 +86,7 @@ class Surface:
 
     @property
     def element(self) -> Element | None:
-        """The thin element that it is, if it is one."""
+        """Thin element of the surface, or None."""
         return cast("Element", self.interface) if hasattr(self.interface, "act") else None
 
     def _check_media(self) -> None:
@@ -129,6 +140,13 @@ class Scene:
     medium: Material | None = None
     # what rooms above have derived from the surfaces (the engine's bodies), kept with them
     derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        named = [f"{s.name} ({type(s.interface).__name__})" for s in self.surfaces[:NAMED_SURFACES]]
+        more = ["..."] if len(self.surfaces) > NAMED_SURFACES else []
+        count = f"{len(self.surfaces)} surface{'s' * (len(self.surfaces) > 1)}"
+        around = "" if self.medium is None else f"in {self.medium.name}"
+        return described(self, f"{count}: {', '.join(named + more)}", around)
 
     def __post_init__(self) -> None:
         surfaces = tuple(self.surfaces) if isinstance(self.surfaces, Iterable) else (self.surfaces,)

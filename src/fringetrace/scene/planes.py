@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,11 +12,7 @@ from fringetrace.core import (
     FloatArray,
 )
 
-if TYPE_CHECKING:
-    pass
-
-
-Axes = tuple[FloatArray, FloatArray, FloatArray]
+PlaneAxes = tuple[FloatArray, FloatArray, FloatArray]
 
 
 def checked_positive(value: float, what: str) -> float:

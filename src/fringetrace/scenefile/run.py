@@ -14,7 +14,16 @@ from typing import Any
 import numpy as np
 
 from fringetrace.accuracy import checks
-from fringetrace.core import Array, ComplexArray, FloatArray, FringetraceWarning, nm, staged, tables
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    FringetraceWarning,
+    nm,
+    short_repr,
+    staged,
+    tables,
+)
 from fringetrace.field import choose, complex_field, irradiance
 from fringetrace.geometry import write_height_map
 from fringetrace.instruments import Interferometer, Mark, records, tiff
@@ -39,6 +48,8 @@ class Run:
     experiment: Experiment
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
 
+    __repr__ = short_repr
+
     def kept(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Value computed once and kept."""
         if key not in self.derived:
@@ -47,7 +58,7 @@ class Run:
 
     @property
     def bench(self) -> Interferometer | None:
-        """The ready bench, if it is one."""
+        """The interferometer, if the setup is one."""
         return None if self.experiment.bench is None else self.experiment.bench.bench
 
     @property

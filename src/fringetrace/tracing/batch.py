@@ -1,4 +1,4 @@
-"""The batch of rays that a tracing loop advances, as columns of equal length."""
+"""Batch of rays that a tracing loop advances, as columns of equal length."""
 
 from __future__ import annotations
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame
-from fringetrace.scene import CCD
+from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.scene import CCD, cross
 from fringetrace.tracing.fates import Fate
 from fringetrace.tracing.paths import Paths
 
@@ -32,12 +32,9 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
     length : (n,) float64, metres
         Optical path to there.
     """
-    _, _, n = frame(ccd.normal, ccd.up, "CCD")
-    facing = paths.direction @ n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = ((ccd.centre - paths.origin) @ n) / facing
-        beside = (paths.fate == Fate.LEFT) & (facing < -FLATTEST) & (reach > 0.0)
-        reach = np.where(beside, reach + ccd.focus / facing, 0.0)
+    reach, _ = cross(ccd, paths.origin, paths.direction)
+    beside = (paths.fate == Fate.LEFT) & np.isfinite(reach) & (paths.direction @ ccd.axes[2] < -FLATTEST)
+    reach = np.where(beside, reach, 0.0)
     rows = np.flatnonzero(beside | (paths.fate == Fate.DETECTED))
     point = paths.origin[rows] + reach[rows, None] * paths.direction[rows]
     index = 1.0 if paths.index is None else paths.index[rows]
@@ -45,7 +42,7 @@ def landed(paths: Paths, ccd: CCD) -> tuple[Array, FloatArray, FloatArray]:
 
 
 def components(paths: Paths, ccd: CCD) -> ComplexArray:
-    """Field that each path brings to a CCD.
+    """Field components of each path on a CCD.
 
     Parameters
     ----------
@@ -86,17 +83,9 @@ def project(paths: Paths, ccd: CCD) -> Paths:
         raise ValueError("project: expected paths traced without a CCD, got paths that have one")
     if paths.wavelength is not None and complex(paths.scene.around.index(paths.wavelength)).imag > 0.0:
         raise ValueError(f"project: expected a transparent medium, got {paths.scene.around.name}")
-    u, v, n = ccd.axes
-    facing = paths.direction @ n
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = ((ccd.centre - paths.origin) @ n) / facing
-        ahead = (paths.fate == Fate.LEFT) & (facing < 0.0) & (reach > 0.0)
-        reach = np.where(ahead, reach + ccd.focus / facing, 0.0)
-    point = paths.origin + reach[:, None] * paths.direction
-    offset = point - ccd.centre
-    width, height = ccd.size
-    x, y = offset @ u, offset @ v
-    seen = ahead & (abs(x) <= 0.5 * width) & (x < 0.5 * width) & (abs(y) <= 0.5 * height) & (y < 0.5 * height)
+    reach, hit = cross(ccd, paths.origin, paths.direction)
+    seen = hit & (paths.fate == Fate.LEFT)
+    reach = np.where(seen, reach, 0.0)
     lengths = paths.lengths
     if lengths is not None:
         lengths = lengths.copy()
@@ -105,9 +94,7 @@ def project(paths: Paths, ccd: CCD) -> Paths:
         paths,
         lengths=lengths,
         fate=np.where(seen, np.int8(Fate.DETECTED), paths.fate),
-        length=np.where(
-            seen, paths.length + reach * (1.0 if paths.index is None else paths.index), paths.length
-        ),
-        origin=np.where(seen[:, None], point, paths.origin),
+        length=paths.length + reach * (1.0 if paths.index is None else paths.index),
+        origin=paths.origin + reach[:, None] * paths.direction,
         ccd=ccd,
     )

@@ -95,7 +95,7 @@ class Record:
         self.branches = np.array([0, *[0, 1] * len(plan.scene.surfaces), *further], dtype=np.int8)
 
     def born(self, parents: Array) -> None:
-        """Paths that part from others."""
+        """Add paths that split off."""
 
         def grown(column: Array) -> Array:
             return np.concatenate([column, column[parents]])
@@ -105,7 +105,7 @@ class Record:
             self.passes = [{name: grown(column) for name, column in one.items()} for one in self.passes]
 
     def met(self, serials: Array, triangle: Array, point: FloatArray) -> None:
-        """Add a pass, in which some paths met a triangle."""
+        """Add a pass in which paths hit triangles."""
         rows = len(self.key)
         blank: dict[str, Array] = {
             n: np.full((rows, *shape), fill, kind) for n, (fill, kind, shape) in self.columns.items()
@@ -114,20 +114,20 @@ class Record:
         self.write(serials, triangle=triangle, point=point)
 
     def went_on(self, serials: Array, key: npt.NDArray[np.uint64], **columns: Array) -> None:
-        """What some paths did in the pass that was added last: their keys now, and more."""
+        """Write the branches that paths took in the latest pass: their keys, and more."""
         base = np.uint64(len(self.branches))
         digit = key - base * self.key[serials]  # modulo 2^64, as keys are
         self.key[serials] = key
         self.write(serials, branch=self.branches[digit.astype(np.int64)], **columns)
 
     def write(self, serials: Array, **columns: Array) -> None:
-        """Fill columns of the pass that was added last."""
+        """Fill columns of the latest pass."""
         for name, values in columns.items():
             if name in self.columns:
                 self.passes[-1][name][serials] = values
 
     def table(self, name: str, serials: Array, depth: int) -> Array:
-        """A column of the first passes for some paths, (m, depth, ...)."""
+        """Column of the first passes for some paths, (m, depth, ...)."""
         fill, kind, shape = self.columns[name]
         table: Array = np.full((len(serials), depth, *shape), fill, kind)
         for k, one in enumerate(self.passes[:depth]):
@@ -283,7 +283,7 @@ def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: i
 
 
 def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
-    """The record of a chunk as the padded tables of `Paths`, from `surface` to `advances`.
+    """Recorded paths of a chunk as the padded tables of `Paths`, from `surface` to `advances`.
 
     Parameters
     ----------

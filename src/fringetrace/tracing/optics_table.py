@@ -117,7 +117,7 @@ def plain(scene: Scene, polarised: bool) -> bool:
 
 
 def needs(scene: Scene) -> str | None:
-    """What makes a scene depend on the wavelength, in words; None if nothing does.
+    """Reason why a scene depends on the wavelength, in words; None if it does not.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Further rays through the scene of traced paths."""
+"""Ray query: further rays through the scene of traced paths."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def retrace(
     max_bounces: int | None = None,
     min_amplitude: float | None = None,
 ) -> Paths:
-    """Trace further rays through the scene of some paths, onto their CCD, at their wavelength.
+    """Trace further rays through the scene of paths, onto their CCD, at their wavelength.
 
     Parameters
     ----------

@@ -8,7 +8,7 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, component, filled, unit
+from fringetrace.core import Array, ComplexArray, FloatArray, component, described, filled, unit, value_text
 from fringetrace.scene import Beam, as_names
 
 # A field may point along its ray by as much: rounding.
@@ -63,6 +63,15 @@ class Rays:
     area: float | None = None
     passes: tuple[str, ...] = ()
     polarisation: ComplexArray | None = None
+
+    def __repr__(self) -> str:
+        count, bare = f"{len(self):,} rays", self.area is None
+        return described(
+            self,
+            count if bare else f"{count} of {self.area:.6g} m^2 each",
+            "" if self.polarisation is None else "polarised",
+            f"passes {value_text(self.passes)}" if self.passes else "",
+        )
 
     def __post_init__(self) -> None:
         origin = _rows_of_three(self.origin, "Rays origin")

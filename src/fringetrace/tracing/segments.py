@@ -1,4 +1,4 @@
-"""Segments and hits of recorded paths: lengths, directions, media, optical path and phase along the way."""
+"""Segments and hits of recorded paths: lengths, directions, media, optical path and phase."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.core import Array, FloatArray, dot, short_repr, unit
 from fringetrace.geometry import Fit, LevelFit, Patches
 from fringetrace.scene import Surface
 from fringetrace.tracing.optics_table import constants
@@ -26,7 +26,7 @@ def _recorded(paths: Paths, what: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Segments:
-    """Segments of recorded paths: one before each hit, and one behind the last, to the CCD.
+    """Segments of recorded paths: one before each hit, and one after the last, to the CCD.
 
     Attributes
     ----------
@@ -52,9 +52,11 @@ class Segments:
     through: npt.NDArray[np.bool_]
     advance: FloatArray
 
+    __repr__ = short_repr
+
     @staticmethod
     def of(paths: Paths) -> Segments:
-        """The segments of some paths.
+        """Segments of recorded paths.
 
         Parameters
         ----------
@@ -85,7 +87,7 @@ class Segments:
         )
 
     def optical_path(self, start: FloatArray | float = 0.0) -> FloatArray:
-        """Optical path from the start to each point.
+        """Optical path length from the start to each point.
 
         Parameters
         ----------
@@ -132,7 +134,7 @@ def _through(paths: Paths, direction: Array) -> npt.NDArray[np.bool_]:
 
 
 def surface_phase(paths: Paths, through: Array) -> FloatArray:
-    """By how much surfaces turned the phase up to each point.
+    """Phase added by surfaces up to each point.
 
     Parameters
     ----------
@@ -191,16 +193,18 @@ class SurfaceHits:
     point: FloatArray
     face: npt.NDArray[np.int64]
 
+    __repr__ = short_repr
+
     @property
     def formed(self) -> npt.NDArray[np.bool_]:
-        """(n,) bool: on facets that have a form."""
+        """Whether each hit is on a facet with an exact form, (n,) bool."""
         if self.fit is None:
             return np.zeros(len(self.face), dtype=np.bool_)
         return np.asarray(self.fit.along[self.face] != 0)
 
     @cached_property
     def corners(self) -> FloatArray:
-        """(n, 3, 3) float64, metres: corners of the facets, first those of the shortest side.
+        """Corners of the facets, the shortest side first, (n, 3, 3) float64, metres.
 
         Good for normals of needles.
         """
@@ -211,20 +215,20 @@ class SurfaceHits:
 
     @cached_property
     def facet_normal(self) -> FloatArray:
-        """(n, 3) float64, unit: normals of the facets, towards the front."""
+        """Facet normals towards the front, (n, 3) float64, unit."""
         corner = self.corners
         return unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
 
     @cached_property
     def normal(self) -> FloatArray:
-        """(n, 3) float64, unit: normals of the surface, of either sense; those of the form if it has one."""
+        """Surface normals of either sign, those of the form if it has one, (n, 3) float64, unit."""
         normal, on = self.facet_normal.copy(), self.formed
         if on.any():
             normal[on] = unit(self.level(on, normal[on])[1])
         return normal
 
     def level(self, rows: Array, direction: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Level function of the form at some hits, and its derivatives.
+        """Level function of the form at hits, and its derivatives.
 
         Parameters
         ----------

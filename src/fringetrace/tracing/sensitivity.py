@@ -1,4 +1,4 @@
-"""Derivatives of the optical path and of ray directions with respect to where surfaces stand."""
+"""Derivatives of optical paths and of ray directions with respect to surface positions."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fringetrace.tracing.segments import EXTENDED, Segments, SurfaceHits
 
 
 def path_change(segments: Segments, hits: SurfaceHits, offset: Array) -> Array:
-    """Change of optical paths where a surface stands somewhere else: -(n' d_out - n d_in) . offset.
+    """Change of the optical path due to a surface offset: -(n' d_out - n d_in) . offset.
 
     By Fermat's principle, errors of directions and of places along the surfaces do not count, to first order.
 
@@ -36,7 +36,7 @@ def path_change(segments: Segments, hits: SurfaceHits, offset: Array) -> Array:
 
 
 def leverage(segments: Segments, hits: SurfaceHits) -> FloatArray:
-    """How far rays turn at each hit where the surface turns by 1: 2 off a mirror.
+    """Change of ray direction per unit rotation of the surface at each hit: 2 off a mirror.
 
     From Snell's law, n' d' = n d + (n' c' - n c) nu, with cosines c to the normal nu.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, tables
+from fringetrace.core import Array, FloatArray, short_repr, tables
 from fringetrace.field import chosen
 from fringetrace.geometry import Mesh, interpolate_height, write_height_map
 from fringetrace.instruments import Interferometer, path_slope, records, step_axis, tiff
@@ -61,6 +61,8 @@ class Measurement:
     residual: FloatArray
     smooth: Array
     ledger: Ledger
+
+    __repr__ = short_repr
 
     @property
     def interferogram(self) -> FloatArray:
@@ -150,7 +152,7 @@ def _piston(differences: FloatArray, wavelength: float) -> float:
 def measure_height(
     bench: Interferometer, truth: FloatArray, wavelength: float, steps: int = 4
 ) -> Measurement:
-    """Record phase-stepped frames on a bench, find the height, and compare it with the truth.
+    """Measure a sample: record phase-stepped frames, compute the height, compare it with the mesh.
 
     Parameters
     ----------

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fringetrace import instruments
-from fringetrace.core import ComplexArray, FloatArray, mm, nm, rotation, um, wavenumber
+from fringetrace.core import ComplexArray, FloatArray, mm, nm, rotation, short_repr, um, wavenumber
 from fringetrace.geometry import Mesh, forms, shapes
 from fringetrace.optics import Mirror
-from fringetrace.scene import CCD, Beam, Scene, Surface
+from fringetrace.scene import CCD, Beam, Scene, Surface, pixel_centres
 
 WAVELENGTH = 632.8 * nm
 # Gauss points along either side of a pixel: half a wave a pixel is then averaged to 1e-12.
@@ -52,6 +52,8 @@ class Standard:
     beam: Beam
     ccd: CCD
     truth: Callable[[], Truth]
+
+    __repr__ = short_repr
 
     @property
     def curved(self) -> bool:
@@ -273,7 +275,7 @@ def tilt(pixels: int, cells: int) -> Standard:
     arm = 0.5 * ccd.focus
 
     def truth() -> Truth:
-        x = np.asarray((np.arange(pixels) - 0.5 * (pixels - 1)) * pitch, dtype=np.float64)
+        x, _ = pixel_centres((pixels, pixels), pitch)
         slope = math.sin(2.0 * angle)
         own = -0.5j * _turned(np.array(2.0 * arm))
         other = np.sinc(pitch * slope / WAVELENGTH) * reference(x, angle, arm)

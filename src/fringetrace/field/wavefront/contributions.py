@@ -1,4 +1,4 @@
-"""What waves bring to sample points: optical path and amplitude, found once for all wavelengths."""
+"""Contributions of waves at sample points: optical path and amplitude, the same for all wavelengths."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray
+from fringetrace.core import ComplexArray, FloatArray, short_repr
 from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront import plane_waves
 from fringetrace.field.wavefront.patches import PatchCells
@@ -25,7 +25,7 @@ NONE = np.array([np.inf, -np.inf, np.inf, -np.inf])
 
 @dataclass(frozen=True, eq=False)
 class PlaneWave:
-    """A plane wave off facets and its region of a beam.
+    """Plane wave off facets, and its region of a beam.
 
     `path` is a row of the paths that has its key, `odd` whether it has an odd number of half-wave losses.
     """
@@ -36,10 +36,12 @@ class PlaneWave:
     wave: Wave
     region: Region
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class CurvedWave:
-    """A curved sheet; `path` and `odd` as those of `PlaneWave`.
+    """Curved wavefront of patches; `path` and `odd` as those of `PlaneWave`.
 
     `unit` is the area of the beam that a step of its grid stands for, in pixels.
     """
@@ -49,10 +51,12 @@ class CurvedWave:
     unit: float
     cells: PatchCells
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Contributions:
-    """Waves at sample points.
+    """Contributions of waves at sample points.
 
     Attributes
     ----------
@@ -74,16 +78,18 @@ class Contributions:
     base: FloatArray
     slope: FloatArray
 
+    __repr__ = short_repr
+
     @property
     def nbytes(self) -> int:
-        """Memory of the tables."""
+        """Memory of the tables, bytes."""
         return self.rows.nbytes + self.slope.nbytes + 5 * self.points.x.nbytes
 
     def field(
         self, wavelength: float, component: int, groups: int, group: npt.NDArray[np.int64], sign: FloatArray,
         folded: Mapping[int, Folds],
     ) -> tuple[ComplexArray, FloatArray]:  # fmt: skip
-        """The field at the points.
+        """Field at the points.
 
         Parameters
         ----------
@@ -118,7 +124,7 @@ class Contributions:
 def find_contributions(
     plane: Sequence[PlaneWave], curved: Sequence[CurvedWave], components: int, points: Samples, slopes: bool
 ) -> Contributions:
-    """What waves bring to sample points.
+    """Contributions of waves at sample points.
 
     Parameters
     ----------

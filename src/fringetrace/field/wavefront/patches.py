@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, frame
+from fringetrace.core import Array, ComplexArray, FloatArray
 from fringetrace.field.wavefront.ray_tubes import along_grid, caustics, differences
-from fringetrace.scene import CCD, Beam
+from fringetrace.scene import CCD, Beam, pixels
 from fringetrace.tracing import Paths, components, landed
 
 # Of the fields of a cell (x, y, path, J) the amplitudes come last: two for each component.
@@ -51,7 +51,7 @@ class Sheet:
 
 @dataclass(frozen=True, eq=False)
 class PatchCells:
-    """A sheet's cells as the kernels read them, see `raster_kernels`; for `place` see `leaved`."""
+    """Cells of a wavefront in the form that the kernels read; for `place` see `leaved`."""
 
     coefficients: FloatArray
     leaves: FloatArray
@@ -77,7 +77,7 @@ class PatchCells:
 
     @cached_property
     def folds(self) -> bool:
-        """Whether there are folds: then the field depends on the wavelength by more than the phase."""
+        """Whether there are folds, where the field depends on the wavelength beyond its phase."""
         from fringetrace.field.wavefront.raster_kernels import SIGN
 
         return bool(self.crossed.any() or (self.leaves[:, SIGN] == 0.0).any())
@@ -108,6 +108,20 @@ def sheets(paths: Paths) -> Iterator[Sheet]:
         yield sheet(paths, rows[keys == key], ccd, beam.shape)
 
 
+def on_grid(values: Array, node: Array, shape: tuple[int, int]) -> Array:
+    """Values (n, ...) of nodes on their grid (rows, columns, ...); NaN, or 0 of whole numbers, elsewhere."""
+    fill = np.nan if values.dtype.kind in "fc" else 0
+    blank = np.full((shape[0] * shape[1], *values.shape[1:]), fill, dtype=values.dtype)
+    blank[node] = values
+    return blank.reshape(*shape, *values.shape[1:])
+
+
+def positions(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> FloatArray:
+    """Where some paths cross the CCD's plane of focus, (rows, columns, 2) pixels on a grid: y, x."""
+    chosen = paths.where(rows)
+    return on_grid(pixels(ccd, landed(chosen, ccd)[1]), chosen.ray, shape)
+
+
 def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
     """Arrivals of one surface sequence on a grid.
 
@@ -128,10 +142,7 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
     arrived = arrivals(paths, rows, ccd)
 
     def grid(values: Array) -> Array:
-        fill = np.nan if values.dtype.kind in "fc" else 0
-        blank = np.full((shape[0] * shape[1], *values.shape[1:]), fill, dtype=values.dtype)
-        blank[paths.ray[rows]] = values
-        return blank.reshape(*shape, *values.shape[1:])
+        return on_grid(values, chosen.ray, shape)
 
     base = float(arrived.length.mean()) if len(rows) else 0.0
     turns = np.zeros(shape, dtype=np.int64)
@@ -176,18 +187,18 @@ def arrivals(paths: Paths, rows: Array, ccd: CCD) -> Arrivals:
     -------
     Arrivals
     """
-    u, v, _ = frame(ccd.normal, ccd.up, "CCD")
+    u, v, _ = ccd.axes
     chosen = paths.where(rows)
     _, point, length = landed(chosen, ccd)
-    offset, direction = point - ccd.centre, chosen.direction
+    pixel, direction = pixels(ccd, point), chosen.direction
     way, last = None, np.zeros(len(rows))
     if chosen.points is not None:
         bounces = int(chosen.bounces.max(initial=0))
         way = np.concatenate([chosen.points[:, : bounces + 1], point[:, None]], axis=1)
         last = np.einsum("ij,ij->i", way[:, -1] - way[:, -2], direction)
     return Arrivals(
-        x=offset @ u / ccd.pitch + 0.5 * ccd.shape[1],
-        y=offset @ v / ccd.pitch + 0.5 * ccd.shape[0],
+        x=pixel[:, 1],
+        y=pixel[:, 0],
         slope_x=chosen.gradient @ u * ccd.pitch,
         slope_y=chosen.gradient @ v * ccd.pitch,
         length=length,
@@ -285,7 +296,7 @@ def leaved(
     lines: FloatArray,
     ccd: CCD,
 ) -> PatchCells:
-    """PatchCells and their leaves.
+    """Patch cells with their quadtree leaves.
 
     Parameters
     ----------

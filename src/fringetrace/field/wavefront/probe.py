@@ -35,7 +35,7 @@ class Probe:
 
     @property
     def fuzz(self) -> FloatArray:
-        """How well edges are known, in cells of the beam's grid: along columns, along rows."""
+        """Uncertainty of edges in cells of the beam's grid: along columns, along rows."""
         bounds = np.stack([surface.mesh.bounds for surface in self.traced.scene.surfaces])
         size = float((bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)).max())
         cells = np.array(self.beam.shape[::-1]) / np.array(self.beam.size)

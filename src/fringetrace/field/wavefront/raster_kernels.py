@@ -21,6 +21,9 @@ CELL, S0, S1, T0, T1, SIGN, LEFT, RIGHT, LOW, HIGH, A, B, C = range(13)
 REGULAR = 0.35
 # A regular leaf reaches this part of its width beyond its probes at most, a fold a few times that.
 MARGIN = 0.03
+# The remainder of a path in wavelengths is exact by a product of halves of float64's digits for fewer than
+# MANY of them: 2^26 and 2^27 + 1.
+MANY, SPLITTER = 67108864.0, 134217729.0
 # A cell is halved this often at most.
 DEPTH = 6
 # Cells own their sides shifted by this part of a cell: a sample exactly on a side has one owner.
@@ -174,7 +177,7 @@ def gradient(cells, cell, s, t):
 
 @jit
 def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, x, y, slope):
-    """What regular leaves bring to the sample points of a band of pixels that begins at row `top`.
+    """Contributions of regular leaves at the sample points of a band of pixels from row `top` on.
 
     A row for each: the number of the point, the optical path, real and imaginary part of each component
     of the amplitude. `folded` marks cells in which J changes its sign, `turns` has their caustics passed
@@ -224,16 +227,24 @@ def leaf_contributions(leaves, cells, folded, turns, unit, top, columns, first, 
 
 @jit
 def add_waves(rows, begin, component, period, group, factor, field):
-    """Add waves at a wavelength to the fields of their groups; `rows` as `leaf_contributions` has them.
+    """Add waves at a wavelength to the fields of their groups; `rows` as in `leaf_contributions`.
 
     Those of wave w are rows begin[w] to begin[w + 1]; they are multiplied by factor[w].
     """
     c = 2 + 2 * component
+    # the wavelength in two parts (T. J. Dekker, Numer. Math. 18 (1971) 224): n times the longer is exact
+    long = period * SPLITTER
+    long -= long - period
+    short = period - long
     for wave in range(len(begin) - 1):
         light, there = factor[wave], field[group[wave]]
-        for row in rows[begin[wave] : begin[wave + 1]]:
-            turn = 2.0 * np.pi * ((row[1] % period) / period)
-            there[int(row[0])] += light * complex(row[c], row[c + 1]) * complex(np.cos(turn), np.sin(turn))
+        for row in range(begin[wave], begin[wave + 1]):
+            way = rows[row, 1]
+            number = np.rint(way / period)
+            rest = (way - number * long) - number * short if abs(number) < MANY else way % period
+            turn = 2.0 * np.pi * (rest / period)
+            wave_here = complex(rows[row, c], rows[row, c + 1]) * complex(np.cos(turn), np.sin(turn))
+            there[int(rows[row, 0])] += light * wave_here
 
 
 @part
@@ -248,7 +259,7 @@ def plane_wave_contributions(
     inverse, origin, path, gradient, amplitude, kind, low_s, low_t, begin, pieces, first,
     x, y, where_x, where_y, shape, slope, pixels,
 ):  # fmt: skip
-    """What a plane wave brings to the sample points that its region of the beam reaches.
+    """Contributions of a plane wave at the sample points that its region of the beam reaches.
 
     (s, t) = inverse (point - origin); the path at the origin is `path`, its gradient `gradient`.
     `kind` of each cell from (low_s, low_t) on: 0 dark, 1 lit, 2 in pieces, those of the cell from

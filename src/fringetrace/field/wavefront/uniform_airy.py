@@ -68,7 +68,7 @@ from fringetrace.field.wavefront.raster_kernels import (
 
 @dataclass(frozen=True, eq=False)
 class Folds:
-    """PatchCells of a sheet, see `PatchCells`, and the folds on it at a wavelength.
+    """Folds of a wavefront at a wavelength, with its `PatchCells`.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Folds:
 
 
 def folds(sheet: PatchCells, period: float, unit: float, component: int = 0) -> Folds:
-    """Find the folds of a sheet.
+    """Find the folds of a wavefront.
 
     Parameters
     ----------
@@ -256,7 +256,7 @@ def probe(cells, cell, leaf, sign):
 def add_folds(
     leaves, cells, folded, turns, unit, period, place, rows, latest, top, columns, first, x, y, field, slope
 ):
-    """Add the waves of leaves on and beside folds, but those of `rows`; see `leaf_contributions`."""
+    """Add the waves of leaves on and beside folds, except `rows`; see `leaf_contributions`."""
     for leaf in leaves:
         cell = int(leaf[CELL])
         low, above = max(int(np.floor(leaf[LOW])), top), int(np.floor(leaf[HIGH]))

@@ -146,7 +146,7 @@ def _cell(at: FloatArray, shape: tuple[int, int]) -> npt.NDArray[np.int64]:
 
 
 def survey(paths: Paths) -> Survey:
-    """Trace anew from the nodes of a beam's grid, and where features may hide between them.
+    """Trace from the nodes of a beam's grid, and from points where features may hide between them.
 
     Rays are sent to either side of the edges of meshes: rims, edges between facets, and silhouettes;
     and from the centres of cells where `paths` met other surfaces than the rays from all four corners.

@@ -1,4 +1,4 @@
-"""Wavefronts of traced beams: reconstructed once, evaluated at any wavelength on the pixels of the CCD."""
+"""Wavefronts of traced beams: reconstructed once, evaluated at any wavelength on the pixels of a CCD."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Groups = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Wavefronts:
-    """The waves that traced beams bring to a CCD, at any wavelength.
+    """Wavefronts of traced beams on a CCD, at any wavelength.
 
     Attributes
     ----------
@@ -69,18 +69,18 @@ class Wavefronts:
 
     @cached_property
     def edges(self) -> Edges:
-        """Which pixels the edges cross."""
+        """Pixels that edges cross."""
         return edges(self.segments, self.ccd.shape)
 
     @property
     def nbytes(self) -> int:
-        """Memory of the curved waves, which need most."""
+        """Memory of the curved waves, bytes."""
         return sum(wave.cells.coefficients.nbytes + wave.cells.leaves.nbytes for wave in self.curved)
 
     def complex_field(
         self, wavelength: float, groups: npt.ArrayLike | None = None, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """Mean of the complex field over each pixel.
+        """Complex field, averaged over each pixel.
 
         Parameters
         ----------
@@ -108,7 +108,7 @@ class Wavefronts:
     def mutual_intensity(
         self, light: float | Spectrum, groups: npt.ArrayLike, half_wave_loss: bool = True
     ) -> ComplexArray:
-        """Mean over each pixel of E_m conj(E_n), for the fields of groups of paths.
+        """Mutual intensity E_m conj(E_n) of groups of paths, averaged over each pixel.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Wavefronts:
         return np.asarray(images[0], dtype=np.complex128)
 
     def irradiance(self, light: float | Spectrum, half_wave_loss: bool = True) -> FloatArray:
-        """Mean of |E|^2 over each pixel.
+        """Irradiance |E|^2, averaged over each pixel.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class Wavefronts:
         return np.ascontiguousarray(mutual[0, 0, 0].real)
 
     def refined(self, wavelength: float, rows: tuple[int, int], more: int = 0) -> ComplexArray:
-        """Mean field of some rows of pixels, with more sample points than it asks for.
+        """Mean field of some rows of pixels, with more sample points than usual.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class Wavefronts:
 
 
 class Evaluation:
-    """The fields of groups of waves at sample points, as `averaged` asks for them."""
+    """Fields of groups of waves at sample points, for `averaged`."""
 
     def __init__(self, wavefronts: Wavefronts, groups: Groups, half_wave_loss: bool) -> None:
         waves: list[PlaneWave | CurvedWave] = [*wavefronts.plane, *wavefronts.curved]
@@ -219,7 +219,7 @@ class Evaluation:
         }
 
     def at(self, points: Samples, slopes: bool) -> Contributions:
-        """What the waves bring to sample points at any wavelength; kept at the centres of the pixels."""
+        """Contributions of the waves at sample points, for any wavelength; kept at the pixel centres."""
         one, kept = self.wavefronts, self.wavefronts.derived
         key = points.top, len(points.x)
         if not slopes:
@@ -239,7 +239,7 @@ class Evaluation:
 
 
 def reconstruct(paths: Paths | Iterable[Paths], wavelength: float | None = None) -> Wavefronts:
-    """Wavefronts of traced beams, for fields and irradiances at any wavelength.
+    """Reconstruct the wavefronts of traced beams, for fields and irradiances at any wavelength.
 
     What does not depend on the wavelength is found once, and kept with the paths: which sequences of
     surfaces light takes, where they end on the beam's grid, plane waves and curved patches. Some more rays
@@ -314,9 +314,8 @@ def _reconstructed(paths: Paths) -> Wavefronts:
     plane = [
         PlaneWave(*about[wave.name], beam, wave, region) for wave, region in plane_waves.plane_waves_of(seen)
     ]
-    cells, rim = curved_waves.curved(seen)
-    named = seen.names[seen.curved]
-    sheets = [CurvedWave(*about[name], unit, one) for name, one in zip(named, cells, strict=True)]
+    curved_seen, rim = curved_waves.curved(seen)
+    sheets = [CurvedWave(*about[seen.names[index]], unit, cells) for index, cells in curved_seen]
     drawn = [one.wave.to_pixels(one.region.segments).reshape(-1, 4) for one in plane]
     segments = np.concatenate([rim, *drawn])
     return Wavefronts(ccd, tuple(plane), tuple(sheets), segments, len(paths), components, None)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, checked_wavelength, path_phase
+from fringetrace.core import Array, FloatArray, checked_wavelength, path_phase, short_repr
 from fringetrace.instruments import Mark
 from fringetrace.scene import CCD, Beam
 from fringetrace.tracing import Fate, Paths, Segments, at_wavelength, surface_phase
@@ -81,6 +81,8 @@ class Strands:
     routes: tuple[str, ...]
     rays: int
     focused: bool = False
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.ray)
@@ -279,8 +281,8 @@ def _ended(paths: Paths, onward: float) -> tuple[FloatArray, FloatArray, tuple[A
         seen = np.flatnonzero(paths.fate == Fate.DETECTED)
         ccd, direction = paths.ccd, paths.direction[seen]
         last = points[seen, end[seen]]
-        back = ((ccd.centre - last) @ ccd.normal) / (direction @ ccd.normal)
-        points[seen, end[seen]] = last + back[:, None] * direction
+        back = ccd.focus / (direction @ ccd.axes[2])  # to the plane of focus, as it was
+        points[seen, end[seen]] = last - back[:, None] * direction
     left = np.flatnonzero(paths.fate == Fate.LEFT)
     beyond = left, end[left] + 1
     assert paths.starts is not None

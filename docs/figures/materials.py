@@ -1,4 +1,4 @@
-"""Write the table of named materials in docs/materials.md: `python benchmarks/materials.py`."""
+"""Write the table of named materials in docs/materials.md: `python docs/figures/materials.py`."""
 
 from __future__ import annotations
 

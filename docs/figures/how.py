@@ -1,6 +1,6 @@
 """The pictures of docs/how.md: sheets of light between rays, and bodies of surfaces.
 
-python docs/figures.py   writes docs/images/sheets.png and docs/images/bodies.png
+python docs/figures/how.py   writes docs/images/sheets.png and docs/images/bodies.png
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fringetrace import mm, um
 from fringetrace.field.wavefront.patches import sheets
 from fringetrace.tracing.intersect.embree import build
 
-IMAGES = Path(__file__).parent / "images"
+IMAGES = Path(__file__).parents[1] / "images"
 BLUE, ORANGE, GREEN, RED, GREY = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#999999"
 TIGHT = {"handletextpad": 0.3, "columnspacing": 1.0, "handlelength": 1.2}
 RADIUS, TILT = 20 * mm, 0.13  # light that starts at R sin(TILT) touches the caustic at the camera

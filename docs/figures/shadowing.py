@@ -1,7 +1,7 @@
 """Rays between two discs in float64 and in 60 digits: where they part, and that the wave does not.
 
-python benchmarks/shadowing.py           print the table
-python benchmarks/shadowing.py --write   and write it into docs/budget.md
+python docs/figures/shadowing.py           print the table
+python docs/figures/shadowing.py --write   and write it into docs/budget.md
 """
 
 from __future__ import annotations

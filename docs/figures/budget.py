@@ -1,7 +1,7 @@
 """The error budget beside the true error, term by term, on scenes whose truth is known.
 
-python benchmarks/budget.py           print the table
-python benchmarks/budget.py --write   and write it into docs/budget.md
+python docs/figures/budget.py           print the table
+python docs/figures/budget.py --write   and write it into docs/budget.md
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from fringetrace.core.vectors import rotation
 from fringetrace.geometry import forms, shapes
 from fringetrace.tracing.rays import launch
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
 import arrivals
 
 HENE = 632.8 * nm

@@ -1,7 +1,7 @@
 """The pictures of docs/colour.md: swatches, colours against angles, spheres, a spectrum; and what aliases.
 
-python benchmarks/colours.py           draw the pictures
-python benchmarks/colours.py --write   and put what fringes need into docs/colour.md
+python docs/figures/colours.py           draw the pictures
+python docs/figures/colours.py --write   and put what fringes need into docs/colour.md
 """
 
 import sys
@@ -17,7 +17,7 @@ from fringetrace.core import tables
 from fringetrace.scattering import bsdf_tables, colour
 from fringetrace.views.plots import colour_plots
 
-IMAGES = Path(__file__).parents[1] / "docs" / "images"
+IMAGES = Path(__file__).parents[1] / "images"
 W = colour.resolving_wavelengths(4e-6)
 
 

@@ -1,6 +1,6 @@
 """Figure of docs/architecture.md: its three chains of functions, drawn from the page's own tables.
 
-python docs/architecture.py   writes docs/images/architecture.png
+python docs/figures/architecture.py   writes docs/images/architecture.png
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from typing import Any
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyBboxPatch
 
-DOCS = Path(__file__).parent
+DOCS = Path(__file__).parents[1]
 CHAIN = re.compile(r"^## (One .*?)\n(.*?)(?=^## )", flags=re.DOTALL | re.MULTILINE)
 STEP = re.compile(r"^\| ([^|]+) \| `([\w/]+)/(\w+\.py: [\w.]+)` \|$", flags=re.MULTILINE)
-LINE = 44  # characters of a box's text on a line
-WIDTH, HEIGHT, STRIDE = 0.92, 0.80, 1.0  # of a box, and from box to box; columns are 1 wide
+LINE = 34  # characters of a box's text on a line
+WIDTH, HEIGHT, STRIDE = 0.94, 0.84, 1.0  # of a box, and from box to box; columns are 1 wide
 COLOURS = {
     "geometry": "#E69F00", "scene": "#CC79A7", "instruments": "#7A5195", "tracing": "#0072B2",
     "field": "#009E73", "phase": "#D55E00", "scattering": "#A6761D", "views": "#666666",
@@ -37,16 +37,16 @@ def box(axes: Any, column: int, row: int, step: tuple[str, str, str]) -> None:
     style = "round,pad=0,rounding_size=0.03"
     corner = (x - WIDTH / 2, y - HEIGHT / 2)
     axes.add_patch(FancyBboxPatch(corner, WIDTH, HEIGHT, style, facecolor="white", edgecolor=colour, lw=1.4))
-    axes.text(x, y + 0.13, textwrap.fill(result, LINE), ha="center", va="center", fontsize=10)
-    name = f"{folder}/{function}"
-    axes.text(x, y - 0.27, name, ha="center", va="center", fontsize=7.5, family="monospace", color=colour)
+    axes.text(x, y + 0.18, textwrap.fill(result, LINE), ha="center", va="center", fontsize=9.5)
+    name = f"{folder}/{function}".replace(": ", ":\n")
+    axes.text(x, y - 0.23, name, ha="center", va="center", fontsize=8.5, family="monospace", color=colour)
 
 
 def draw(axes: Any, page: str) -> int:
     """Draw all chains side by side; the number of rows that they take."""
     found = chains(page)
     for column, (title, steps) in enumerate(found):
-        axes.text(column + 0.5, 0.75, title, ha="center", fontsize=13, weight="bold")
+        axes.text(column + 0.5, 0.75, title, ha="center", fontsize=11, weight="bold")
         for row, step in enumerate(steps):
             box(axes, column, row, step)
             if row:
@@ -61,7 +61,7 @@ def draw(axes: Any, page: str) -> int:
 
 if __name__ == "__main__":
     page = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    figure = Figure(figsize=(12, 10.5), layout="constrained")
+    figure = Figure(figsize=(9, 12.5), layout="constrained")
     draw(figure.subplots(), page)
     part = DOCS / "images" / "architecture.png.part"
     figure.savefig(part, format="png", dpi=110)

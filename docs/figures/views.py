@@ -1,4 +1,4 @@
-"""The pictures of docs/views.md: python benchmarks/views.py."""
+"""The pictures of docs/views.md: python docs/figures/views.py."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """What the physics tests compare with what, and how far off they were: measured while the tests run.
 
-python benchmarks/verification.py           print the tables
-python benchmarks/verification.py --write   and write them into docs/verification.md
+python docs/figures/verification.py           print the tables
+python docs/figures/verification.py --write   and write them into docs/verification.md
 
 No error is typed in. A plugin listens to the comparisons that each test makes (`assert a < b`,
 `pytest.approx`, `numpy.testing.assert_allclose`); of those that `verification.csv` names, the one nearest to
@@ -31,7 +31,7 @@ import numpy as np
 import pages
 import pytest
 
-TESTS = Path(__file__).parents[1] / "tests" / "physics"
+TESTS = Path(__file__).parents[2] / "tests" / "physics"
 # Section, system, truth, test, unit (unless relative), and a part of the statement that is meant.
 SYSTEMS = Path(__file__).with_suffix(".csv")
 # pytest compares arrays and sequences number by number, with this.

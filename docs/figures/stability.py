@@ -1,7 +1,7 @@
 """Stress tests of numerical stability: the worst figure of each, against mpmath or a closed form.
 
-python benchmarks/stability.py           print the table
-python benchmarks/stability.py --write   and write its section of docs/accuracy.md
+python docs/figures/stability.py           print the table
+python docs/figures/stability.py --write   and write its section of docs/accuracy.md
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import math
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 
 import mpmath
 import numpy as np
@@ -58,10 +59,11 @@ def exact_length(paths, row):
     origin = [mpmath.mpf(float(x)) for x in rays.origin[paths.ray[row]]]
     along = unit_mp([mpmath.mpf(float(x)) for x in rays.direction[paths.ray[row]]])
     total = mpmath.mpf(float(rays.length[paths.ray[row]]))
+    plane = cache(partial(plane_mp, paths))  # few triangles are met many times
     for surface, triangle in zip(paths.surface[row], paths.triangle[row], strict=True):
         if surface < 0:
             break
-        corner, normal = plane_mp(paths, surface, triangle)
+        corner, normal = plane(surface, triangle)
         offset = [c - o for c, o in zip(corner, origin, strict=True)]
         step = dot_mp(offset, normal) / dot_mp(along, normal)
         origin = [o + step * d for o, d in zip(origin, along, strict=True)]
@@ -364,10 +366,10 @@ def table() -> str:
 
 INTRODUCTION = """## Numerical stability
 
-The worst figure of each stress test, made by `benchmarks/stability.py --write`;
-`tests/physics/test_stability.py` keeps them. Errors are of the optical path, in waves of 500 nm (of
-1/10,000 of its size for the scene in five units) unless the row names another unit; astray are rays
-that missed, leaked, hit what they had just left, or went into a wrong pixel.
+The table shows the worst figure of each stress test. `docs/figures/stability.py --write` made it, and
+`tests/physics/test_stability.py` checks it. Errors are of the optical path, in waves of 500 nm (in
+1/10,000 of its size for the scene in five units) unless the row names another unit. Rays astray
+missed, leaked, hit the triangle that they had just left, or reached a wrong pixel.
 
 """
 

