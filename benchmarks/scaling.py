@@ -21,8 +21,7 @@ import numpy as np
 
 HENE = 632.8e-9
 SIZES = (10, 30, 100, 300, 1129, 2523)
-DOCS = Path(__file__).parent.parent / "docs" / "wavefront.md"
-BEGIN, END = "<!-- scaling: begin -->", "<!-- scaling: end -->"
+DOCS = Path(__file__).parent.parent / "docs"
 
 
 def coin(count: int, relief: float = 1e-6, width: float = 12e-3) -> tuple[np.ndarray, np.ndarray]:
@@ -121,10 +120,11 @@ def main() -> None:
             print(table(rows[-1:]).splitlines()[-1], flush=True)
     print(table(rows))
     if given.write:
-        text = DOCS.read_text()
-        before, after = text.split(BEGIN)[0], text.split(END)[1]
-        DOCS.write_text(f"{before}{BEGIN}\n{table(rows)}\n{END}{after}")
-        plot(rows, DOCS.parent / "images" / "scaling.png")
+        sys.path.insert(0, str(DOCS / "figures"))
+        import pages
+
+        pages.write("scaling", table(rows), DOCS / "wavefront.md")
+        plot(rows, DOCS / "images" / "scaling.png")
 
 
 if __name__ == "__main__":

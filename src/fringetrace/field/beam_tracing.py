@@ -111,18 +111,18 @@ def follow_beam(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int, min_amplit
     """
     reflection, transmission = constants(scene)
     base = 2 * len(scene.surfaces) + 1
-    optics = kernels.Optics(reflection, transmission, base, max_bounces, min_amplitude**2)
+    optics = kernels.Interfaces(reflection, transmission, base, max_bounces, min_amplitude**2)
     return _joined(*_followed(scene, beam, ccd, optics))
 
 
 def _followed(
-    scene: Scene, beam: Beam, ccd: CCD, optics: kernels.Optics
+    scene: Scene, beam: Beam, ccd: CCD, optics: kernels.Interfaces
 ) -> tuple[list[list[Array]], FloatArray]:
     """Tables of footprints (corners, ends, waves, keys) for parts of the source, and the power."""
     facets = facet_tables(scene)
     size = float(np.nanmax(np.abs(facets.corners.reshape(-1, 3) - beam.centre)))
     slack = max(SAME_IN_PIXEL * ccd.pitch, SAME_IN_SCENE * size)
-    limits = kernels.Limits(SLIVER * ccd.pitch**2, slack, SAME_IN_SCENE * size)
+    limits = kernels.Tolerances(SLIVER * ccd.pitch**2, slack, SAME_IN_SCENE * size)
     source = np.concatenate([beam.centre, *beam.axes, np.zeros(4)])
     width, height = beam.size
     count = sum(len(surface.mesh.faces) for surface in scene.surfaces)
