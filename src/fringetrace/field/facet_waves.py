@@ -178,6 +178,8 @@ def prevented(paths: Paths) -> str | None:
     beam, scene = paths.source, paths.scene
     if not isinstance(beam, Beam) or paths.ccd is None:
         return "light that is no beam onto a CCD"
+    if paths.points is not None and paths.triangle is None:
+        return "arrivals that no facet stands for"
     if beam.passes:
         return "a beam that passes over surfaces"
     formed = next((surface.name for surface in scene.surfaces if surface.form is not None), None)

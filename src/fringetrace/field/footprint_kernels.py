@@ -34,6 +34,8 @@ from fringetrace.field.polygon_kernels import (
 
 # A smaller part of a pixel is rounding; one that misses no more fills it.
 NONE, ALL = 1e-12, 1.0 - 1e-9
+# Points stand for a part of a pixel this much nearer its middle than they should: inside a triangle.
+WITHIN = 0.9
 # Step of a slope (radians a pixel) for a derivative: its square, times 1e-2, is what it misses.
 STEP = 1e-3
 
@@ -124,9 +126,9 @@ def sources(columns, corners, first, begin, members, waves, middle, at):
             count = cut(corners, first, n, x, y, square, polygon, spare)
             cx, cy, xx, yy, xy = moments(polygon, max(count, 1))
             # a root of twice the covariance (Cholesky)
-            along = np.sqrt(2.0 * xx)
-            shear = 2.0 * xy / along if along > 0.0 else 0.0
-            up = np.sqrt(max(2.0 * yy - shear * shear, 0.0))
+            along = np.sqrt(2.0 * xx) * WITHIN
+            shear = 2.0 * xy * WITHIN**2 / along if along > 0.0 else 0.0
+            up = np.sqrt(max(2.0 * yy * WITHIN**2 - shear * shear, 0.0))
             middle[k, 0], middle[k, 1], middle[k, 2], middle[k, 3], middle[k, 4] = cx, cy, along, shear, up
             for j in range(4):
                 sign = 1.0 - 2.0 * (j % 2)
