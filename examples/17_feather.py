@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import fringetrace as ft
 from fringetrace import nm
-from fringetrace.scattering import RodLattice, colour, rod_studies
+from fringetrace.scattering import RodLattice, colour, lattice_validity, rod_studies
 from fringetrace.views.plots import colour_plots
 
 waves = np.arange(400, 701, 5) * nm
@@ -39,7 +39,7 @@ for name, (period, pitch, diameter, layers) in BARBULES.items():
     bragg = 2 * (part * melanin + (1 - part) * keratin) * period
     band = waves[reflectance.argmax()] / nm
     print(f"{name}: {labels[-1]}: band at {band:.0f} nm; Bragg, 2 * mean index * period: {bragg:.0f} nm")
-print("rays there:", lattice.validity(500 * nm))
+print("rays there:", lattice_validity(lattice, 500 * nm))
 
 figure = Figure(figsize=(9, 6), layout="constrained")
 colours, panel = figure.subplots(2, 1, height_ratios=(1, 4))

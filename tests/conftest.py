@@ -14,10 +14,12 @@ settings.load_profile("fringetrace")
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionstart(session):
-    """Before all tests compile each kernel once, on two cores: else every worker does so for itself."""
+    """Compile each kernel once, on two cores, before all tests or several workers: else each worker does."""
     config = session.config
+    if hasattr(config, "workerinput") or config.option.collectonly:
+        return
     whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
-    if hasattr(config, "workerinput") or not whole or config.option.collectonly:
+    if not (whole or config.getoption("numprocesses", None)):
         return
     script = Path(__file__).with_name("compiled.py")
     halves = [subprocess.Popen([sys.executable, str(script), half]) for half in ("rays", "light")]

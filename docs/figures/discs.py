@@ -108,7 +108,7 @@ def through(index, k, polarisation, turn, passes=4):
             i = np.clip(i - np.where(abs(step) < 0.01, step, 0.0), start[0], start[-1])
         cosine, inner = np.cos(i), np.sqrt(1 - (np.sin(i) / index) ** 2)
         growth = 2 - 2 * p * cosine / (index * inner)
-        one, other = (cosine, index * inner) if polarisation == "E" else (index * cosine, inner)
+        one, other = (cosine, index * inner) if polarisation == "s" else (index * cosine, inner)
         reflected = (one - other) / (one + other)
         strength = reflected if p == 0 else (1 - reflected**2) * (-reflected) ** (p - 1)
         phase = k * (2 * p * index * inner - 2 * cosine) - math.pi / 2 * (p - (growth < 0))

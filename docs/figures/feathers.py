@@ -18,6 +18,7 @@ from fringetrace import degree, nm
 from fringetrace.scattering.detectors import Cones
 from fringetrace.scattering.goniometer import brdf
 from fringetrace.scattering.rod_lattice import RodLattice
+from fringetrace.scattering.rod_solvers import lattice_validity
 from fringetrace.scattering.rod_studies import cluster, specular
 
 PAGE, FIGURE = pages.DOCS / "study.md", pages.DOCS / "images" / "feathers.png"
@@ -82,7 +83,7 @@ def text(found: dict[str, dict[str, np.ndarray]]) -> str:
         table = specular(FEATHER, 0.0, WAVES, method=method)
         peak = float(WAVES[int(table.values.argmax())]) / nm
         lines.append(f"| endless rows, {method} | {peak:.0f} | reflectance {table.values.max():.3g} |")
-    return "\n".join([*lines, f"\nMelanin in keratin at 550 nm: {FEATHER.validity(550 * nm)}."])
+    return "\n".join([*lines, f"\nMelanin in keratin at 550 nm: {lattice_validity(FEATHER, 550 * nm)}."])
 
 
 def draw(found: dict[str, dict[str, np.ndarray]]) -> None:

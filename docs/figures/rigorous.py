@@ -42,7 +42,7 @@ def error(rays, exact):
 def opaque(sizes, polarisation):
     """Error of rays on two conducting discs, light coming off at 40 to 120 degrees."""
     out = np.radians(np.linspace(40, 120, 81))
-    sign = -1 if polarisation == "E" else 1
+    sign = -1 if polarisation == "s" else 1
     found = [discs.rays(PAIR, 5, IN, each, 9) for each in out]
     errors = []
     for size in sizes:
@@ -70,15 +70,15 @@ def _percent(value):
 
 def rays_table():
     """Errors of rays in per cent as rods grow, and the laws of `validity`."""
-    columns = [opaque(SIZES, "E"), opaque(SIZES, "H")]
+    columns = [opaque(SIZES, "s"), opaque(SIZES, "p")]
     for index in CLEAR:
-        columns += [clear(SIZES, index, "E", 3, 180), clear(SIZES, index, "E", 15, 45)]
+        columns += [clear(SIZES, index, "s", 3, 180), clear(SIZES, index, "s", 15, 45)]
     laws = [
         [ft.validity(size / 2 / math.pi, 1.0, index).ray_error for size in SIZES]
         for index in (CONDUCTOR, 1.5)
     ]
     head = (
-        "| k a | two conducting discs, E | H | law 2.4 / k a | clear rod m = 1.12, 3-180 deg | 15-45 deg "
+        "| k a | two conducting discs, s | p | law 2.4 / k a | clear rod m = 1.12, 3-180 deg | 15-45 deg "
         "| m = 1.5, 3-180 deg | 15-45 deg | law 3 / sqrt(k a) |\n" + "| ---: " * 9 + "|"
     )
     order = [columns[0], columns[1], laws[0], *columns[2:], laws[1]]
@@ -93,7 +93,7 @@ def draw_rays(columns, laws):
     """Errors of rays against size."""
     figure = Figure(figsize=(6.4, 4.2), layout="constrained")
     axes = figure.subplots()
-    names = ["two conducting discs, E", "the same, H"]
+    names = ["two conducting discs, s", "the same, p"]
     names += [f"clear rod, m = {m}, {part}" for m in CLEAR for part in ("beyond 3°", "15° to 45°")]
     for column, name, style in zip(columns, names, ("o", "s", "^", "v", "D", "P"), strict=True):
         axes.loglog(SIZES, column, style + "-", label=name, lw=0.8, ms=5)
@@ -142,7 +142,7 @@ def cluster_table():
     out = math.pi / 2 + np.radians([-60, -40, -20, 0, 20, 40, 60])
     found = np.zeros((len(ANGLES), len(out), len(WAVELENGTHS)))
     for j, wavelength in enumerate(WAVELENGTHS):
-        for polarisation in ("E", "H"):
+        for polarisation in ("s", "p"):
             light = scatter(rods, wavelength, IN + incidence, polarisation, orders=6)
             found[..., j] += differential_width(light, out) / 2
     rows = [
@@ -156,7 +156,7 @@ def cluster_table():
 
 
 def wires():
-    """What 20 x 4 conducting rods in air send straight back, E, least and most of 400 to 550 nm."""
+    """What 20 x 4 conducting rods in air send straight back, s light, least and most of 400 to 550 nm."""
     said = []
     for name, shift in (("square", 0.0), ("staggered", 0.5)):
         centres = [((i + shift * (j % 2)) * 280 * nm, j * 280 * nm) for i in range(20) for j in range(4)]
@@ -167,7 +167,7 @@ def wires():
             f"{name} {sent[low] / 1e3:.0f} µm/rad ({at[low] / nm:.0f} nm) to {sent[high] / 1e3:.0f} µm/rad "
             f"({at[high] / nm:.0f} nm), median {np.median(sent) / 1e3:.0f}"
         )
-    return f"20 x 4 such rods, E light of 400 to 550 nm straight back: {'; '.join(said)}."
+    return f"20 x 4 such rods, s light of 400 to 550 nm straight back: {'; '.join(said)}."
 
 
 def draw_peacock(curves):

@@ -26,9 +26,12 @@ from .core import (
     vectors as vectors,
 )
 from .field import (
+    Field as Field,
+    Wavefronts as Wavefronts,
     complex_field as complex_field,
     irradiance as irradiance,
     mutual_intensity as mutual_intensity,
+    reconstruct as reconstruct,
 )
 from .geometry import Mesh as Mesh, forms as forms, meshes as meshes, shapes as shapes
 from .instruments import lenses as lenses, records as records, tiff as tiff

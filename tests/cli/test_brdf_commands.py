@@ -47,6 +47,7 @@ def feathers(tmp_path):
     return str(tmp_path / "feathers.csv")
 
 
+@pytest.mark.slow
 def test_a_mesh_of_matter_in_polarised_light_beside_measured_spectra(rods, feathers, tmp_path, capsys):
     given = ["brdf", str(rods), "--unit", "um", *SHORT, "--rays", "1", "60", "--measured", feathers]
     given += ["--material", "1.7", "--around", "1.5"]
@@ -85,7 +86,7 @@ def test_a_feather_by_rigorous_methods(feathers, tmp_path, capsys, monkeypatch):
         "lattice", "--columns", "3", "--rows", "2", "--pitch", "150 nm", "--arrangement", "square", *SHORT,
     ]  # fmt: skip
     given += ["--rod", "melanin", "--host", "1.55", "--cortex", "100 nm", "--channel", "10 nm"]
-    rods = [*given, "--method", "rods", "--polarisation", "H", "--out", str(tmp_path / "rods")]
+    rods = [*given, "--method", "rods", "--polarisation", "p", "--out", str(tmp_path / "rods")]
     assert command.main(rods) == 0
     assert "not told by this method" in capsys.readouterr().out
     layered = [*given, "--method", "multilayer", "--measured", feathers, "--out", str(tmp_path / "layers")]

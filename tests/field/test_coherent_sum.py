@@ -9,7 +9,7 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import nm, um
-from fringetrace.field.coherent_sum import method_for
+from fringetrace.field.coherent_sum import LONGEST, choose
 from fringetrace.field.pixel_quadrature import mutual_products
 from fringetrace.geometry import shapes
 from fringetrace.tracing.paths import join
@@ -170,22 +170,38 @@ def test_light_that_does_not_reach_the_ccd_leaves_no_trace():
 # The method by itself
 
 
-def test_the_wavefront_is_taken_where_facets_are_few():
+def test_the_method_is_chosen_by_what_it_can_do_and_what_it_costs():
     paths = ft.trace(EMPTY, scattered(2), ccd())
-    assert method_for(paths) == "rays"
+    assert choose(paths).method == "rays"
     beam = ft.Beam((0, 0, 0), (0, 0, 1), (0, 1, 0), (0.5, 0.5), (40, 40))
+    glass = {"interface": ft.Dielectric(follow="reflected"), "back": 1.5}
 
-    def method(mesh, form=None, shape=(40, 40)):
-        scene = ft.Scene([ft.Surface(mesh, ft.Mirror(), form=form)])
-        return method_for(ft.trace(scene, replace(beam, shape=shape), ccd(), max_bounces=1))
+    def choice(mesh, shape=(40, 40), interface=None, **more):
+        scene = ft.Scene([ft.Surface(mesh, interface or ft.Mirror(), **more)])
+        return choose(ft.trace(scene, replace(beam, shape=shape), ccd(), max_bounces=1))
 
-    assert method(shapes.plate(4.0, 4.0)) == "wavefront"
     ball = shapes.icosphere(0.4, 3)  # 1280 facets
-    assert method(ball) == "rays"
-    assert method(ball, shape=(160, 160)) == "wavefront"
-    assert method(ball, ft.forms.Sphere((0, 0, 0), 0.4)) == "wavefront"
+    # facets alone are exact, however many
+    assert choice(shapes.plate(4.0, 4.0)).method == "facets"
+    assert choice(ball).method == "facets"
+    # beside media it depends on how many rays share one
+    assert choice(shapes.plate(4.0, 4.0), **glass).method == "wavefront"
+    assert choice(ball, **glass).method == "rays"
+    assert choice(ball, shape=(160, 160), **glass).method == "wavefront"
+    assert choice(ball, form=ft.forms.Sphere((0, 0, 0), 0.4)).method == "wavefront"
     # coplanar triangles are one facet
-    assert method(shapes.height_map(np.zeros((40, 40)), 0.1)) == "wavefront"
+    assert choice(shapes.height_map(np.zeros((40, 40)), 0.1), **glass).method == "wavefront"
+    # nothing is begun that takes too long
+    long = choice(ball, shape=(800, 800), **glass)
+    assert long.method == "rays"
+    assert str(long) == "rays: wavefronts off 1,280 flat facets take 819 s; about 1 s"
+    assert LONGEST < 1280 * 800 * 800 * 1e-6
+
+
+def test_unknown_methods_are_refused():
+    paths = ft.trace(EMPTY, scattered(2), ccd())
+    with pytest.raises(ValueError, match=r"method: expected one of .*, got 'waves'"):
+        choose(paths, "waves")
 
 
 # Groups
@@ -236,7 +252,7 @@ def test_a_wavelength_in_text():
 
 def test_methods_that_are_none():
     paths = ft.trace(EMPTY, scattered(2), ccd())
-    with pytest.raises(ValueError, match="method: expected 'auto', 'wavefront' or 'rays', got 'waves'"):
+    with pytest.raises(ValueError, match=r"method: expected one of .*, got 'waves'"):
         ft.complex_field(paths, 633 * nm, method="waves")
 
 

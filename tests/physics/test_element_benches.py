@@ -5,7 +5,7 @@ import pytest
 from meetings import EPS
 
 import fringetrace as ft
-from fringetrace.field.coherent_sum import method_for
+from fringetrace.field import chosen
 from fringetrace.optics.birefringent import ShearPlate, Wollaston
 from fringetrace.optics.elements import Annulus, IdealLens
 from fringetrace.optics.gratings import Grating, lamellar
@@ -129,7 +129,7 @@ def test_polarised_beams_part_and_meet_again_as_wavefronts():
 def test_behind_pixels_and_stops_light_is_a_sum_of_rays():
     stop = standing(Annulus((0, 0, 0), 1 * mm, 2 * mm), 0.0, "stop")
     paths = ft.trace(ft.Scene([stop]), beam(5 * mm, (50, 50)), camera(5 * mm, 0.1 * mm, (50, 50)))
-    assert method_for(paths) == "rays"
+    assert chosen(paths, "auto") == "rays"
     image = ft.irradiance(paths, LAMBDA)
     assert set(np.round(image, 12).ravel()) == {0.0, 1.0}
     with pytest.raises(ValueError, match="method: expected 'rays' behind stop, which tears wavefronts, got"):

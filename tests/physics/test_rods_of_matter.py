@@ -25,8 +25,8 @@ def test_clear_lattice_in_air_and_keratin():
     wavelength = np.array([420, 450, 480, 500, 520]) * nm
     lattice = feather(150, 150, 100, 90, 0, 8, index=1.75, host=1.55)
     for polarisation, expected in (
-        ("E", [0.07455966, 0.23992057, 0.28111708, 0.09531645, 0.04261329]),
-        ("H", [0.06520142, 0.22631745, 0.22707138, 0.05740897, 0.03670615]),
+        ("s", [0.07455966, 0.23992057, 0.28111708, 0.09531645, 0.04261329]),
+        ("p", [0.06520142, 0.22631745, 0.22707138, 0.05740897, 0.03670615]),
     ):
         found = reflectance_spectrum(lattice, wavelength, 0.0, polarisation)
         np.testing.assert_allclose(found.reflectance, expected, atol=DIGITS)
@@ -73,17 +73,17 @@ def test_a_blue_green_feather_against_angle():
         for angle in (0, 20, 40, 60)
     ]
     np.testing.assert_allclose(found, [0.232607, 0.307132, 0.170053, 0.033458], rtol=TABLE)
-    assert reflectance_spectrum(lattice, wavelength, 0.0, "E").reflectance == pytest.approx(
+    assert reflectance_spectrum(lattice, wavelength, 0.0, "s").reflectance == pytest.approx(
         0.2004505, abs=1e-7
     )
-    assert reflectance_spectrum(lattice, wavelength, 0.0, "H").reflectance == pytest.approx(
+    assert reflectance_spectrum(lattice, wavelength, 0.0, "p").reflectance == pytest.approx(
         0.264846, abs=1e-6
     )
 
 
 @pytest.mark.parametrize(
     ("polarisation", "expected"),
-    [("E", [302.56, 781.58, 1140.59, 1155.01, 891.15]), ("H", [334.12, 815.46, 1145.88, 1129.74, 852.56])],
+    [("s", [302.56, 781.58, 1140.59, 1155.01, 891.15]), ("p", [334.12, 815.46, 1145.88, 1129.74, 852.56])],
 )
 def test_backscatter_of_twenty_by_four_melanin_rods(polarisation, expected):
     centres = [(i * 150 * nm, j * 150 * nm) for i in range(20) for j in range(4)]
@@ -98,7 +98,7 @@ def test_conducting_rods_in_air_reflect_without_a_band():
     centres = [(i * 280 * nm, j * 280 * nm) for i in range(20) for j in range(4)]
     rods = Cylinders(centres, 65 * nm, CONDUCTOR)
     found = [
-        differential_width(scatter(rods, wavelength * nm, IN, "E", orders=5), math.pi / 2)[0, 0] / nm
+        differential_width(scatter(rods, wavelength * nm, IN, "s", orders=5), math.pi / 2)[0, 0] / nm
         for wavelength in (400, 475, 550)
     ]
     assert 54.5e3 < min(found) < max(found) < 73.5e3

@@ -289,7 +289,7 @@ def test_at_a_right_angle_all_light_comes_back(last, film):
     light = film, 1.0, last, 0.5 * math.pi, 500 * nm
     assert films.transmittance(*light) == (0.0, 0.0)
     assert films.reflectance(*light) == (1.0, 1.0)
-    stacked = effective_medium.stack_powers([0.0], [1.0], 1.0, last, 500 * nm, 0.5 * math.pi, "H")
+    stacked = effective_medium.stack_powers([0.0], [1.0], 1.0, last, 500 * nm, 0.5 * math.pi, "p")
     assert (stacked.reflectance, stacked.transmittance) == (1.0, 0.0)
 
 

@@ -33,7 +33,7 @@ THREE = Cylinders([(0, 0), (1.1, 0.2), (-0.3, 1.3)], [0.5, 0.4, 0.3], [1.5, 1.7 
     ],
 )
 def test_efficiencies_of_single_cylinders(size, index, e, h):
-    for polarisation, expected in (("E", e), ("H", h)):
+    for polarisation, expected in (("s", e), ("p", h)):
         found = efficiencies(size / 2 / math.pi, index, 1.0, 1.0, polarisation)
         assert found.scattering == pytest.approx(expected, abs=PRINTED)
         assert found.extinction == pytest.approx(expected, abs=PRINTED)
@@ -42,7 +42,7 @@ def test_efficiencies_of_single_cylinders(size, index, e, h):
 
 def test_efficiencies_of_an_absorbing_cylinder():
     for polarisation, extinction, scattering in (
-        ("E", 3.795172643, 3.072222973), ("H", 2.992109435, 2.427271597)
+        ("s", 3.795172643, 3.072222973), ("p", 2.992109435, 2.427271597)
     ):  # fmt: skip
         found = efficiencies(2 / 2 / math.pi, 1.7428 + 0.0879j, 1.0, 1.0, polarisation)
         assert found.extinction == pytest.approx(extinction, abs=PRINTED)
@@ -50,7 +50,7 @@ def test_efficiencies_of_an_absorbing_cylinder():
 
 
 def test_coefficients_broadcast_and_conserve_power():
-    found = scattering_coefficients([0.1, 0.4], np.array([1.5, 3.0]), 1.2, 0.7, "H", 4)
+    found = scattering_coefficients([0.1, 0.4], np.array([1.5, 3.0]), 1.2, 0.7, "p", 4)
     assert found.shape == (2, 9)
     np.testing.assert_allclose(abs(1 + 2 * found), 1, rtol=BALANCE)
 
@@ -58,7 +58,7 @@ def test_coefficients_broadcast_and_conserve_power():
 @pytest.mark.parametrize(
     # treams, a T-matrix program; H is of 8 digits, as far as its orders went
     ("polarisation", "scattering", "extinction", "digits"),
-    [("E", 2.515991714, 3.226449554, 6e-10), ("H", 1.716691932, 2.420211073, 1e-8)],
+    [("s", 2.515991714, 3.226449554, 6e-10), ("p", 1.716691932, 2.420211073, 1e-8)],
 )
 def test_three_cylinders(polarisation, scattering, extinction, digits):
     found = widths(scatter(THREE, 0.8, 0.3, polarisation, orders=22))
@@ -66,14 +66,14 @@ def test_three_cylinders(polarisation, scattering, extinction, digits):
     assert found.extinction[0] == pytest.approx(extinction, abs=digits)
 
 
-@pytest.mark.parametrize("polarisation", ["E", "H"])
+@pytest.mark.parametrize("polarisation", ["s", "p"])
 def test_optical_theorem(polarisation):
     found = widths(scatter(THREE, 0.8, [0.3, 2.0], polarisation))
     np.testing.assert_allclose(found.extinction, found.scattering + found.absorption, rtol=BALANCE)
     assert np.all(found.absorption > 0.1)
 
 
-@pytest.mark.parametrize("polarisation", ["E", "H"])
+@pytest.mark.parametrize("polarisation", ["s", "p"])
 def test_reciprocity(polarisation):
     there, back = 0.3, 2.1
     one = amplitude(scatter(THREE, 0.8, there, polarisation), back)[0, 0]
@@ -82,12 +82,12 @@ def test_reciprocity(polarisation):
 
 
 def test_one_cylinder_in_a_cluster_is_a_single_one():
-    alone = efficiencies(0.3, 1.5 + 0.1j, 1.3, 0.8, "H")
-    found = widths(scatter(Cylinders([(0.2, -0.4)], 0.3, 1.5 + 0.1j, 1.3), 0.8, 0.7, "H"))
+    alone = efficiencies(0.3, 1.5 + 0.1j, 1.3, 0.8, "p")
+    found = widths(scatter(Cylinders([(0.2, -0.4)], 0.3, 1.5 + 0.1j, 1.3), 0.8, 0.7, "p"))
     np.testing.assert_allclose(np.ravel(found) / 0.6, alone, rtol=BALANCE)
 
 
-@pytest.mark.parametrize("polarisation", ["E", "H"])
+@pytest.mark.parametrize("polarisation", ["s", "p"])
 def test_fields_are_continuous_across_surfaces(polarisation):
     rods = Cylinders([(0, 0), (1.2, 0.3)], [0.5, 0.4], [1.5 + 0.2j, lambda w: 2.0 * w / 0.8], lambda w: 1.1)
     found = scatter(rods, 0.8, 0.3, polarisation, orders=24)
@@ -106,7 +106,7 @@ def test_no_field_in_a_conductor_and_none_on_it():
 
 
 def test_near_field_becomes_the_amplitude():
-    found, far = scatter(THREE, 0.8, 0.3, "H"), 1e6
+    found, far = scatter(THREE, 0.8, 0.3, "p"), 1e6
     k = found.wavenumber
     point = far * np.array([math.cos(2.0), math.sin(2.0)])
     incident = np.exp(1j * k * far * math.cos(2.0 - 0.3))
@@ -155,7 +155,7 @@ def test_indices_may_be_an_array():
     assert np.array_equal(several.outgoing, listed.outgoing)
 
 
-@pytest.mark.parametrize("polarisation", ["E", "H"])
+@pytest.mark.parametrize("polarisation", ["s", "p"])
 @pytest.mark.parametrize("index", [0.05 + 0j, 0.2 + 3.4j])
 def test_large_bubbles_and_metals(index, polarisation):
     """Coefficients of size 1,500 beside Bessel functions in 30 digits (Bohren and Huffman, 8.30 and 8.32)."""
@@ -170,7 +170,7 @@ def test_large_bubbles_and_metals(index, polarisation):
                 for f, z in ((mpmath.besselj, x), (mpmath.bessely, x), (mpmath.besselj, m * x))
             )
             h, dh = j + 1j * y, dj + 1j * dy
-            contrast = m if polarisation == "E" else 1 / m
+            contrast = m if polarisation == "s" else 1 / m
             expected = -(contrast * di * j - i * dj) / (contrast * di * h - i * dh)
             assert found[max(orders) + n] == pytest.approx(complex(expected), abs=LARGE)
             assert found[max(orders) - n] == found[max(orders) + n]
@@ -188,7 +188,7 @@ def test_field_in_a_large_bubble_is_continuous():
     assert np.isfinite(near_field(bubble, [(0, 0), (1e-300, 0), (199.9, 0)])).all()
 
 
-@pytest.mark.parametrize("polarisation", ["E", "H"])
+@pytest.mark.parametrize("polarisation", ["s", "p"])
 def test_a_tiny_cylinder_beside_a_large_one(polarisation):
     """Orders that the large one needs overflow at the tiny one."""
     radii, index, apart, n = (20.0 / (2 * math.pi), 1e-9), 1.5, 4.0, truncation(20.0)
@@ -217,7 +217,7 @@ def test_scatter_rejects_what_is_not_finite(value):
     with pytest.raises(ValueError, match="Cylinders: expected positive radii in metres"):
         Cylinders([(0, 0)], value, 1.5)
     with pytest.raises(ValueError, match="Host: expected a positive real refractive index, got"):
-        scattering_coefficients(1.0, 1.5, value, 1.0, "E", 3)
+        scattering_coefficients(1.0, 1.5, value, 1.0, "s", 3)
 
 
 def test_scatter_rejects():
@@ -226,15 +226,15 @@ def test_scatter_rejects():
         scatter(rods, 0.0)
     with pytest.raises(ValueError, match="Host: expected a positive real refractive index"):
         scatter(Cylinders([(0, 0)], 0.4, 1.5, 1.3 + 0.1j), 0.5)
-    with pytest.raises(ValueError, match="Polarisation: expected 'E' or 'H', got 'TE'"):
+    with pytest.raises(ValueError, match="Polarisation: expected 's' or 'p', got 'TE'"):
         scatter(rods, 0.5, 0.0, "TE")
 
 
 def test_orders_are_counted_by_any_integer_from_0():
-    one, other = (scattering_coefficients(1.0, 1.5, 1.0, 1.0, "E", orders) for orders in (9, np.uint64(9)))
+    one, other = (scattering_coefficients(1.0, 1.5, 1.0, 1.0, "s", orders) for orders in (9, np.uint64(9)))
     assert np.array_equal(one, other)
     for orders in (-1, 2.5):
         with pytest.raises(ValueError, match="Orders: expected a whole number of at least 0, got"):
-            scattering_coefficients(1.0, 1.5, 1.0, 1.0, "E", orders)
+            scattering_coefficients(1.0, 1.5, 1.0, 1.0, "s", orders)
         with pytest.raises(ValueError, match="Orders: expected a whole number of at least 0, got"):
             scatter(Cylinders([(0, 0)], 0.4, 1.5), 0.5, orders=orders)

@@ -22,7 +22,7 @@ def test_hankel_is_that_of_scipy():
     np.testing.assert_allclose(hankel(x, 30), expected, rtol=ROUNDING * 10)
 
 
-@pytest.mark.parametrize("polarisation", ["E", "H"])
+@pytest.mark.parametrize("polarisation", ["s", "p"])
 @pytest.mark.parametrize("index", [1.7 + 0.2j, 0.2 + 3.4j, 3.0])
 def test_boundary_keeps_tangential_fields_continuous(polarisation, index):
     x, host, n = 2.3, 1.3, np.arange(-9, 10)
@@ -31,7 +31,7 @@ def test_boundary_keeps_tangential_fields_continuous(polarisation, index):
     within = within / jv(n, m * x)
     outside = jv(n, x) + response * hankel1(n, x)
     slope = jvp(n, x) + response * h1vp(n, x)
-    ratio = m if polarisation == "E" else 1 / m
+    ratio = m if polarisation == "s" else 1 / m
     scale = abs(jv(n, x)) + abs(response * hankel1(n, x))
     assert np.all(abs(within * jv(n, m * x) - outside) < ROUNDING * scale)
     assert np.all(abs(ratio * within * jvp(n, m * x) - slope) < 100 * ROUNDING * (scale + abs(slope)))
@@ -39,7 +39,7 @@ def test_boundary_keeps_tangential_fields_continuous(polarisation, index):
 
 
 def test_boundary_of_a_conductor_is_the_limit_of_large_index():
-    for polarisation in ("E", "H"):
+    for polarisation in ("s", "p"):
         metal = boundary(0.2, 1e6j, 1.0, 1.0, polarisation, 5)[0]
         perfect = boundary(0.2, CONDUCTOR, 1.0, 1.0, polarisation, 5)[0]
         # a wave enters by 1 / |index| of a wavelength
@@ -47,15 +47,15 @@ def test_boundary_of_a_conductor_is_the_limit_of_large_index():
 
 
 def test_boundary_rejects_an_unknown_polarisation():
-    with pytest.raises(ValueError, match="Polarisation: expected 'E' or 'H', got 's'"):
-        boundary(1.0, 1.5, 1.0, 1.0, "s", 3)
+    with pytest.raises(ValueError, match="Polarisation: expected 's' or 'p', got 'TE'"):
+        boundary(1.0, 1.5, 1.0, 1.0, "TE", 3)
 
 
 @pytest.mark.parametrize("x", [0.01, 0.3, 3.0, 30.0, 300.0, 1000.0])
 def test_truncation_leaves_out_what_it_promises(x):
     n = truncation(x)
     for index in (1.5, CONDUCTOR):
-        response = abs(boundary(x / 2 / np.pi, index, 1.0, 1.0, "H", n + 1)[0])
+        response = abs(boundary(x / 2 / np.pi, index, 1.0, 1.0, "p", n + 1)[0])
         assert response[-1] < 3 * LEFT_OUT * response.max()
 
 

@@ -13,10 +13,10 @@ RESIDUAL = 1e-10  # iteration ends at 1e-12 of the right side; the matrix may st
 def test_iteration_on_a_grid_is_elimination(monkeypatch, index, shift):
     centres = [(i + shift * (j % 2), 0.9 * j) for i in range(6) for j in range(3)]
     rods = Cylinders(centres, 0.3, index)
-    eliminated = scatter(rods, 1.0, [0.3, 1.0], "H", orders=6).exciting
+    eliminated = scatter(rods, 1.0, [0.3, 1.0], "p", orders=6).exciting
     monkeypatch.setattr(multiple_scattering, "_DENSE", 1)
     monkeypatch.setattr(multiple_scattering, "_LARGEST", 1)  # no way back
-    iterated = scatter(rods, 1.0, [0.3, 1.0], "H", orders=6).exciting
+    iterated = scatter(rods, 1.0, [0.3, 1.0], "p", orders=6).exciting
     assert abs(iterated - eliminated).max() < RESIDUAL * abs(eliminated).max()
 
 

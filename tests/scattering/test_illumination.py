@@ -9,6 +9,7 @@ from fringetrace.geometry.triangles import breadth
 from fringetrace.scattering.detectors import towards
 from fringetrace.scattering.illumination import Illumination, footprint, scene_validity
 from fringetrace.scattering.rod_lattice import RodLattice
+from fringetrace.scattering.rod_solvers import lattice_validity
 
 CENTRE = np.array([1.0, 2.0, 3.0])
 
@@ -56,9 +57,11 @@ def test_the_breadth_of_the_smallest_part():
 def test_what_rays_are_worth_is_that_of_the_smallest_part():
     matter = RodLattice(2, 2, rod="melanin", host="keratin", channel=20 * nm)
     found = scene_validity(matter.scene, 500 * nm)
-    assert found.size_parameter == pytest.approx(matter.validity(500 * nm).size_parameter * 20 / 65, rel=1e-2)
+    assert found.size_parameter == pytest.approx(
+        lattice_validity(matter, 500 * nm).size_parameter * 20 / 65, rel=1e-2
+    )
     assert found.phase < 0.0  # of air
     mirrors = RodLattice(2, 2)
-    found, true = scene_validity(mirrors.scene, 500 * nm), mirrors.validity(500 * nm)
+    found, true = scene_validity(mirrors.scene, 500 * nm), lattice_validity(mirrors, 500 * nm)
     assert found.size_parameter == pytest.approx(true.size_parameter, rel=1e-9)
     assert found.label == true.label

@@ -79,7 +79,7 @@ def test_large_rods_absorb_as_the_rigorous_answer_says():
     index, lacking = 1.5 + 0.1j, []
     for size in (40, 160):
         radius = size / (2 * np.pi) * WAVE[0]
-        true = efficiencies(radius, index, 1.0, WAVE[0], "E").absorption.item()
+        true = efficiencies(radius, index, 1.0, WAVE[0], "s").absorption.item()
         lacking.append(true / powers(one_rod(radius, index), rays=1000)["absorbed"].item() - 1)
     assert 0 < lacking[1] < lacking[0] * 4 ** (-2 / 3)
     assert lacking[1] < 0.5 * 160 ** (-2 / 3)
@@ -131,5 +131,5 @@ def test_what_is_refused(changed, error, message):
 
 
 def test_matter_may_not_overlap():
-    with pytest.raises(ValueError, match="Cylinders: expected them apart"):
+    with pytest.raises(ValueError, match="rods: expected them apart"):
         _ = RodLattice(rod=1.5, disorder=0.3).scene

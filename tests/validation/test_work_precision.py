@@ -167,7 +167,15 @@ def test_sections_are_written_each_on_its_own(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["page.md"]
 
 
-@pytest.mark.parametrize("name", [name for name in skips.SKIPS if name != "imported"])
+DEAR = ("culled", "rephased", "unreached")  # over a second each
+SKIPS = [
+    pytest.param(name, marks=pytest.mark.slow if name in DEAR else ())
+    for name in skips.SKIPS
+    if name != "imported"
+]
+
+
+@pytest.mark.parametrize("name", SKIPS)
 def test_a_skip_changes_no_result(name):
     case = skips.SKIPS[name](24)
     on, off = case.on(), case.off()

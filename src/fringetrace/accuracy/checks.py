@@ -44,9 +44,10 @@ def found(paths: Paths, wavelength: float, method: str = "auto") -> dict[str, st
     if paths.ccd is None or len(seen) == 0:
         return problems
     texts = {"fringes alias": aliasing(paths, wavelength)}
-    if chosen(paths, method) == "rays":
+    method = chosen(paths, method)
+    if method == "rays":
         texts |= {"pixels starve": starvation(seen), "a wave folds": folding(seen)}
-    else:
+    elif method == "wavefront":
         texts["a wave comes to a focus"] = focusing(seen, wavelength)
     return problems | {name: text for name, text in texts.items() if text is not None}
 

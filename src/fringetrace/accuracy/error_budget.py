@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fringetrace.accuracy.checks import found
-from fringetrace.core import Array, FloatArray, checked_wavelength, warn_once
+from fringetrace.core import Array, FloatArray, checked_wavelength, short_repr, warn_once
 from fringetrace.scene import Beam
 from fringetrace.tracing import Paths, at_wavelength, retrace
 
@@ -48,9 +48,11 @@ class Budget:
         Facets off the smooth surface that they may stand for; 0 for flat parts, and where a form is given.
         Where facets are the surface, as those of a prism, this term means nothing.
     sampling : float
-        The number of rays: a grid with half of them either way makes another image.
+        The number of rays: a grid with half of them either way makes another image. With "facets", light
+        that none of the rays found.
     pixels : float
-        The mean over each pixel: more points in it, or the phase slope times what a ray is off its centre.
+        The mean over each pixel: more points in it, or the phase slope times what a ray is off its centre;
+        0 with "facets", which need no points.
     wavelength : float, metres
     method : str
         How the field was found, see `complex_field`.
@@ -65,6 +67,8 @@ class Budget:
     wavelength: float
     method: str
     costliest: tuple[str, float] | None = None
+
+    __repr__ = short_repr
 
     @property
     def total(self) -> float:
@@ -152,6 +156,8 @@ def _budget(paths: Paths, wavelength: float, method: str) -> Budget:
     if method == "rays":
         rays = sampling.count_error(paths, wavelength)
         pixel = sampling.offset_error(paths, wavelength)
+    elif method == "facets":
+        rays, pixel = sampling.missed_error(paths), 0.0
     else:
         grids = list(_halved(paths))
         steps = math.log2(max(paths.source.shape) / max(_shape(grids[0])))

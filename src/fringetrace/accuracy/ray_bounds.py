@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_wavelength
+from fringetrace.core import FloatArray, checked_wavelength, short_repr
 from fringetrace.tracing import Fate, Paths
 
 # Half the distance between neighbouring numbers about 1: the largest relative rounding of float64.
@@ -35,6 +35,8 @@ class Bounds:
     position: FloatArray
     direction: FloatArray
     length: FloatArray
+
+    __repr__ = short_repr
 
     def known(self, wavelength: float, part: float = 0.01) -> npt.NDArray[np.bool_]:
         """Which paths have an optical path known to a part of the wavelength.

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray
-from fringetrace.field import centred, light_on, reconstruct
+from fringetrace.field import centred, light_on, reconstruct, reconstruct_facet_waves
 from fringetrace.scene import CCD, Beam, crop, pixels
 from fringetrace.tracing import Paths
 
@@ -134,6 +134,21 @@ def spread_over_pixels(paths: Paths, wavelength: float) -> Paths:
     cycles = paths.gradient @ np.transpose(paths.ccd.axes[:2]) * (paths.ccd.pitch / parts / wavelength)
     mean = np.sinc(cycles).prod(axis=1)
     return replace(centred(paths, parts), amplitude=paths.amplitude * mean)
+
+
+def missed_error(paths: Paths) -> float:
+    """Error of plane waves off facets: light that takes a way that no ray took, or lies in slivers, in waves.
+
+    Parameters
+    ----------
+    paths : Paths
+        Of a `Beam` onto a CCD, off flat facets.
+
+    Returns
+    -------
+    float, waves; see `budget.Budget`
+    """
+    return math.sqrt(reconstruct_facet_waves(paths).missed) / (2.0 * math.pi)
 
 
 def offset_error(paths: Paths, wavelength: float) -> float:

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from xarray import DataArray
 
     from fringetrace.geometry import Mesh
-    from fringetrace.scattering import Detector, Polarised, RodLattice
+    from fringetrace.optics import PolarisationName
+    from fringetrace.scattering import Detector, RodLattice
     from fringetrace.scene import Scene
 
 # What there is to say, each under a word.
@@ -147,7 +148,7 @@ def lattice(
     acceptance: str = "0.64 deg",
     rays: int = 2000,
     method: str = "rays",
-    polarisation: Literal["E", "H", "unpolarised"] | None = None,
+    polarisation: Literal["s", "p", "unpolarised"] | None = None,
     measured: Path | None = None,
     scheduler: str | None = None,
 ) -> Lines:
@@ -193,7 +194,7 @@ def lattice(
         reflectance of endless rows, as flat layers of effective index, beside the rigorous one, of one
         lattice: reflectance.csv alone.
     polarisation
-        E or H, the field along the rods, or unpolarised. Default: E; of multilayer: unpolarised.
+        s (the field along the rods), p or unpolarised. Default: s; of multilayer: unpolarised.
     measured
         As in `fringetrace brdf`.
     rays
@@ -216,7 +217,7 @@ def lattice(
         return _endless(base, axes, (theta[theta >= 0.0], waves), polarisation or "unpolarised", over, out)
     options: dict[str, Any] = {
         "rays": rays, "half_angle": parse_angle(acceptance, "--acceptance"), "method": method,
-        "polarisation": polarisation or "E",
+        "polarisation": polarisation or "s",
     }  # fmt: skip
     table = scattering.study(
         base, axes, theta, theta, waves, folder=os.fspath(out / "cells"), scheduler=scheduler, **options
@@ -262,8 +263,8 @@ def _lattices(given: dict[str, Any], matter: dict[str, Any]) -> tuple[RodLattice
 
 
 def _endless(
-    base: RodLattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray], polarisation: Polarised,
-    over: DataArray | None, out: Path,
+    base: RodLattice, axes: dict[str, Any], along: tuple[FloatArray, FloatArray],
+    polarisation: PolarisationName, over: DataArray | None, out: Path,
 ) -> Lines:  # fmt: skip
     """Specular spectra of endless rows, layered and rigorous."""
     from fringetrace import scattering, views
@@ -367,7 +368,7 @@ def _first(
         return []
     given = {
         "method": options["method"], "rays": (1, options["rays"]), "max_bounces": rod_studies.BOUNCES,
-        "min_amplitude": rod_studies.FAINT, "polarisation": rod_studies.ALONG[options["polarisation"]],
+        "min_amplitude": rod_studies.FAINT, "polarisation": rod_studies.TRACED[options["polarisation"]],
         **base.lighting,
     }  # fmt: skip
     one = table.isel(dict.fromkeys(axes, 0))

@@ -22,10 +22,10 @@ from fringetrace.core import (
     FloatArray,
     FringetraceWarning,
     checked_wavelength,
+    length_text,
     parse_angle,
     parse_length,
     staged,
-    unit_of,
 )
 from fringetrace.geometry import Mesh
 
@@ -194,7 +194,7 @@ def bench(
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
     """Trace, measure, write; say what was done."""
     from fringetrace.accuracy import judge
-    from fringetrace.field import chosen
+    from fringetrace.field import choose
     from fringetrace.validation import measurement
     from fringetrace.views import viewer
 
@@ -209,13 +209,16 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             few = aside.submit(bench.sampled, viewer.few(bench.beam.shape))
             scene = aside.submit(_draw, bench, few.result, folder)
             few.result()  # before the trace, which needs the same trees
-        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
         with _progress("tracing") as advance:
             start = time.perf_counter()
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
-        method = chosen(bench.trace(), bench.method)
-        costing = aside.submit(judge, bench.trace(), wavelength, method)
+        choice = choose(bench.trace(), bench.method)
+        _say(console, "method", str(choice))
+        # what is averaged over pixels is compared with a mean
+        parts = 1 if choice.method == "rays" else 2
+        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre, parts)
+        costing = aside.submit(judge, bench.trace(), wavelength, choice.method)
         measured = measurement.measure_height(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)
@@ -322,8 +325,8 @@ def _say_bench(console: Console, name: str, mesh: Mesh, bench: Interferometer, w
     _say(
         console,
         "bench",
-        f"Michelson, {_length(wavelength)}, image {_length(width)} x {_length(height)}, "
-        f"{columns} x {rows} pixels of {_length(bench.ccd.pitch)}; "
+        f"Michelson, {length_text(wavelength)}, image {length_text(width)} x {length_text(height)}, "
+        f"{columns} x {rows} pixels of {length_text(bench.ccd.pitch)}; "
         f"reference tilted by {bench.arms.tilt[0] * 1e6:.4g} urad: {fringes:.3g} fringes across",
     )
 
@@ -367,11 +370,6 @@ def _say_result(console: Console, bench: Interferometer, measured: Measurement, 
 def _rms(measured: Measurement, where: Array) -> str:
     rms = measured.rms(where)
     return f"{rms * 1e9:.3g} nm = {rms / measured.wavelength:.2g} waves rms"
-
-
-def _length(metres: float) -> str:
-    name, unit = unit_of(metres)
-    return f"{metres / unit:.4g} {name.replace('µ', 'u')}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

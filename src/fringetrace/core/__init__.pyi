@@ -1,6 +1,12 @@
 from . import sweeps as sweeps, tables as tables, vectors as vectors
-from .compiled import grown as grown, jit as jit, part as part
+from .compiled import grown as grown, jit as jit, lean as lean, part as part
 from .files import staged as staged, whole as whole
+from .represent import (
+    described as described,
+    length_text as length_text,
+    short_repr as short_repr,
+    value_text as value_text,
+)
 from .sweeps import grid as grid, sweep as sweep
 from .tables import (
     Coordinates as Coordinates,

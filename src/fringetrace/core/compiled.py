@@ -12,6 +12,11 @@ from numba import njit
 jit: Any = njit(nogil=True, cache=True, error_model="numpy")
 
 
+# Makes no array, and counts no references to those it is given: a count is an atomic operation, which takes
+# as long as the test of a box, and longer where threads share the array.
+lean: Any = njit(nogil=True, cache=True, error_model="numpy", _nrt=False)  # type: ignore[call-overload]
+
+
 part: Any = njit(nogil=True, cache=True, error_model="numpy", forceinline=True)
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain, groupby
 from typing import Protocol
 
@@ -12,7 +14,7 @@ import numpy.typing as npt
 from fringetrace.core import ComplexArray, FloatArray, checked_wavelength
 from fringetrace.field.checks import warn_of_aliasing
 from fringetrace.field.ray_sum import RaySum
-from fringetrace.scene import Beam, Spectrum
+from fringetrace.scene import Beam, Scene, Spectrum
 from fringetrace.tracing import Paths, at_wavelength, join, needs
 
 
@@ -33,37 +35,87 @@ class PixelLight(Protocol):
         """Mutual intensity, averaged over each pixel; see `mutual_intensity`."""
 
 
+METHODS = ("auto", "facets", "wavefront", "rays")
 # A wavefront is worth its while where so many rays of the beam share a facet, or facets are so few.
 SHARING, FEW = 16, 64
+# What methods take on a core, seconds: a facet and a pixel of "facets", a plane wave and a ray of the beam
+# of "wavefront", a ray of "rays". "auto" starts nothing that takes over `LONGEST`.
+FACET, PIXEL, WAVE, RAY = 1e-5, 3e-6, 1e-6, 1e-7
+LONGEST = 600.0
 
 
-def method_for(paths: Paths) -> str:
-    """Method that "auto" stands for: wavefront or ray sum.
+@dataclass(frozen=True)
+class Choice:
+    """A method of the coherent sum, why it is taken, and about how long it takes, in seconds."""
 
-    "wavefront" for a `Beam` whose rays are at least `SHARING` times as many as the flat facets of the
-    scene (coplanar triangles are one; surfaces with a form have none), or where those are `FEW`;
-    else "rays", as behind elements that tear waves (pixels, stops).
+    method: str
+    why: str
+    seconds: float
+
+    def __str__(self) -> str:
+        return f"{self.method}: {self.why}; about {max(self.seconds, 1.0):.0f} s"
+
+
+def choose(paths: Paths, method: str = "auto") -> Choice:
+    """Choose a method for the coherent sum by what it can do and what it costs.
+
+    "facets" where surfaces are flat facets with constant amplitudes: it is exact, and its time grows with
+    the facets. Else "wavefront" for a `Beam` whose rays are at least `SHARING` times as many as the flat
+    facets of the scene (coplanar triangles are one; surfaces with a form have none), or where those are
+    `FEW`, if it takes less than `LONGEST`; else "rays", as behind elements that tear waves.
 
     Parameters
     ----------
     paths : Paths
+    method : {"auto", "facets", "wavefront", "rays"}
 
     Returns
     -------
-    {"wavefront", "rays"}
+    Choice
+
+    Raises
+    ------
+    ValueError
+        For any other method, for "facets" with surfaces that are none, or for "wavefront" behind elements
+        that tear waves.
     """
+    from fringetrace.field.facet_waves import prevented
+
+    if method not in METHODS:
+        raise ValueError(f"method: expected one of {METHODS}, got {method!r}")
+    tears, why = torn(paths), prevented(paths)
+    if method == "wavefront" and tears:
+        raise ValueError(f"method: expected 'rays' behind {tears}, which tears wavefronts, got 'wavefront'")
+    if method == "facets" and why:
+        raise ValueError(f"method: expected 'wavefront' or 'rays' with {why}, got 'facets'")
+    pixels = 0 if paths.ccd is None else math.prod(paths.ccd.shape)
+    faces = sum(len(surface.mesh.faces) for surface in paths.scene.surfaces)
+    rays = math.prod(paths.source.shape) if isinstance(paths.source, Beam) else 0
+    asked = "asked for" if method != "auto" else None
+    if method == "facets" or (method == "auto" and why is None):
+        return Choice("facets", asked or f"exact for {faces:,} flat facets", faces * FACET + pixels * PIXEL)
+    summed = Choice("rays", asked or (f"{tears} tears waves" if tears else f"{why}"), len(paths) * RAY)
+    if method == "rays" or (method == "auto" and (tears or rays == 0 or pixels == 0)):
+        return summed
+    waves = _flat_facets(paths.scene, max(FEW, rays // SHARING))
+    seconds = waves * rays * WAVE + pixels * PIXEL
+    if method == "auto" and waves > max(FEW, rays // SHARING):
+        return replace(summed, why=f"{waves:,} flat facets or more for {rays:,} rays, with {why}")
+    if method == "auto" and waves > FEW and seconds > LONGEST:
+        return replace(summed, why=f"wavefronts off {waves:,} flat facets take {seconds:,.0f} s")
+    return Choice("wavefront", asked or f"{waves:,} flat facets, with {why}", seconds)
+
+
+def _flat_facets(scene: Scene, enough: int) -> int:
+    """Number of flat facets, coplanar triangles as one; of triangles, if they are no more than enough."""
     from fringetrace.scene import group_facets
 
-    if not isinstance(paths.source, Beam) or paths.ccd is None or torn(paths):
-        return "rays"
-    most = max(FEW, int(np.prod(paths.source.shape)) // SHARING)
-    flat = [surface for surface in paths.scene.surfaces if surface.form is None]
-    if sum(len(surface.mesh.faces) for surface in flat) > most:
-        parts = group_facets(paths.scene)
-        facets = [parts[i].max() + 1 for i, s in enumerate(paths.scene.surfaces) if s.form is None]
-        if sum(facets) > most:
-            return "rays"
-    return "wavefront"
+    flat = [number for number, surface in enumerate(scene.surfaces) if surface.form is None]
+    faces = sum(len(scene.surfaces[number].mesh.faces) for number in flat)
+    if faces <= enough:
+        return faces
+    parts = group_facets(scene)
+    return int(sum(parts[number].max(initial=-1) + 1 for number in flat))
 
 
 def torn(paths: Paths) -> str | None:
@@ -78,7 +130,7 @@ def torn(paths: Paths) -> str | None:
     str or None
     """
     surfaces = paths.scene.surfaces
-    return next((s.name for s in surfaces if getattr(s.interface, "waves", None) == "torn"), None)
+    return next((s.name for s in surfaces if s.interface.waves == "torn"), None)
 
 
 def complex_field(
@@ -96,13 +148,15 @@ def complex_field(
         From `trace`, or chunk by chunk from `stream`; of several coherent beams, one after the other.
     wavelength : float, metres
         Vacuum wavelength. Another one needs no new trace, unless media bend it another way.
-    method : {"auto", "wavefront", "rays"}
+    method : {"auto", "facets", "wavefront", "rays"}
+        "facets": a plane wave off each sequence of flat facets, cut where they and their shadows end;
+        means over pixels are exact, see `FacetWaves`.
         "wavefront": neighbouring rays of a `Beam` with the same path span a sheet, whose mean field
         over each pixel is found; overlapping sheets add. See `irradiance`.
         "rays": the coherent sum E = sum of a exp(2 pi i OPL / wavelength) over the rays that fall
         in a pixel, each weighted with its beam area over the pixel's, so that a unit beam falling
         straight on the CCD gives |E|^2 = 1. Rays without an area have weight 1.
-        "auto": the wavefront where it is worth its while, see `method_for`.
+        "auto": the one that `choose` takes.
     half_wave_loss : bool
         False leaves out the factor -1 of each reflection off a mirror.
     groups : (paths,) int, optional
@@ -214,28 +268,23 @@ def irradiance(
 
 
 def chosen(paths: Paths, method: str) -> str:
-    """Method of the coherent sum, with "auto" resolved.
+    """Method of the coherent sum, with "auto" resolved; see `choose`.
 
     Parameters
     ----------
     paths : Paths
-    method : {"auto", "wavefront", "rays"}
+    method : {"auto", "facets", "wavefront", "rays"}
 
     Returns
     -------
-    {"wavefront", "rays"}
+    {"facets", "wavefront", "rays"}
 
     Raises
     ------
     ValueError
-        For any other method, or for "wavefront" behind elements that tear waves.
+        As `choose`.
     """
-    if method not in ("auto", "wavefront", "rays"):
-        raise ValueError(f"method: expected 'auto', 'wavefront' or 'rays', got {method!r}")
-    tears = torn(paths)
-    if method == "wavefront" and tears:
-        raise ValueError(f"method: expected 'rays' behind {tears}, which tears wavefronts, got 'wavefront'")
-    return method_for(paths) if method == "auto" else method
+    return choose(paths, method).method
 
 
 def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "auto") -> PixelLight:
@@ -249,7 +298,7 @@ def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "a
     Returns
     -------
     PixelLight
-        `Wavefronts`, which are kept with the paths, or a `RaySum`.
+        `FacetWaves` or `Wavefronts`, which are kept with the paths, or a `RaySum`.
 
     Raises
     ------
@@ -258,13 +307,18 @@ def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "a
     """
     wavelength = checked_wavelength(wavelength)
     first, parts = _first(paths)
-    if chosen(first, method) == "rays":
+    method = chosen(first, method)
+    if method == "rays":
         return RaySum(at_wavelength(part, wavelength) for part in parts)
+    # chunks of a stream are parts of one beam
+    beams = [join(list(some)) for _, some in groupby(parts, lambda part: id(part.source))]
+    if method == "facets":
+        from fringetrace.field.facet_waves import reconstruct_facet_waves
+
+        return reconstruct_facet_waves(beams[0] if len(beams) == 1 else beams)
     from fringetrace.field.wavefront.wavefronts import reconstruct
 
-    # chunks of a stream are parts of one beam
-    beams = [list(some) for _, some in groupby(parts, lambda part: id(part.source))]
-    return reconstruct([join(some) for some in beams], wavelength)
+    return reconstruct(beams, wavelength)
 
 
 def _watched(paths: Paths | Iterable[Paths], light: float | Spectrum) -> Iterator[Paths]:
@@ -287,7 +341,7 @@ def _lights(
         return
     parts = [paths] if isinstance(paths, Paths) else list(paths)
     first, _ = _first(parts)
-    if needs(first.scene) is None and chosen(first, method) == "wavefront":
+    if needs(first.scene) is None and chosen(first, method) != "rays":
         yield 1.0, light, light_on(parts, float(light.wavelengths[0]), method)
         return
     for wavelength, share in zip(light.wavelengths.tolist(), light.weights.tolist(), strict=True):

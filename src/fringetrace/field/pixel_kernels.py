@@ -11,21 +11,27 @@ from fringetrace.core import grown, jit, part
 
 
 @jit
-def means(first, weight, field, mean):
-    """Weighted means of the fields over the samples of each pixel."""
-    for m in range(len(field)):
-        for pixel in range(len(first) - 1):
-            total = 0.0j
-            for k in range(first[pixel], first[pixel + 1]):
-                total += weight[k] * field[m, k]
-            mean[m, pixel] = total
+def add_means(first, weight, field, where, share, total):
+    """Add weighted means over the samples of some pixels of the fields to images, times `share`."""
+    columns = where.shape[1]
+    for pixel in range(len(first) - 1):
+        i, j = pixel // columns, pixel % columns
+        if where[i, j]:
+            for m in range(len(field)):
+                mean = 0.0j
+                for k in range(first[pixel], first[pixel + 1]):
+                    mean += weight[k] * field[m, k]
+                total[m, i, j] += share * mean
 
 
 @jit
-def products(first, weight, field, mutual):
-    """Weighted means of E_m conj(E_n) over the samples of each pixel."""
-    groups = len(field)
+def add_mean_products(first, weight, field, where, share, total):
+    """Add those of E_m conj(E_n), (groups**2, rows, columns)."""
+    groups, columns = len(field), where.shape[1]
     for pixel in range(len(first) - 1):
+        i, j = pixel // columns, pixel % columns
+        if not where[i, j]:
+            continue
         for m in range(groups):
             for n in range(m, groups):
                 real, imaginary = 0.0, 0.0
@@ -33,8 +39,63 @@ def products(first, weight, field, mutual):
                     one, other = field[m, k], field[n, k]
                     real += weight[k] * (one.real * other.real + one.imag * other.imag)
                     imaginary += weight[k] * (one.imag * other.real - one.real * other.imag)
-                mutual[m, n, pixel] = complex(real, imaginary)
-                mutual[n, m, pixel] = complex(real, -imaginary)
+                total[m * groups + n, i, j] += share * complex(real, imaginary)
+                if n > m:
+                    total[n * groups + m, i, j] += share * complex(real, -imaginary)
+
+
+@part
+def term(field, m, n, products, i, j):
+    """E_m conj(E_n) of a pixel, or E_m."""
+    one, other = field[m, i, j], field[n, i, j]
+    if not products:
+        return one
+    real = one.real * other.real + one.imag * other.imag
+    return complex(real, one.imag * other.real - one.real * other.imag)
+
+
+@part
+def correction(field, m, n, products, i, j):
+    """(f_xx + f_yy) / 24 at a pixel of such an image, by differences; 0 at the rim."""
+    _, rows, columns = field.shape
+    if i == 0 or j == 0 or i == rows - 1 or j == columns - 1:
+        return 0.0j
+    beside = term(field, m, n, products, i, j + 1) + term(field, m, n, products, i, j - 1)
+    above = term(field, m, n, products, i + 1, j) + term(field, m, n, products, i - 1, j)
+    return (above + beside - 4.0 * term(field, m, n, products, i, j)) / 24.0
+
+
+@jit
+def largest(field, products):
+    """Largest size of the corrections, and of the values, of fields (groups, rows, columns) or products."""
+    groups, rows, columns = field.shape
+    bend, value = np.zeros((rows, columns)), np.zeros((rows, columns))
+    for i in range(rows):
+        for j in range(columns):
+            for m in range(groups):
+                for n in range(m, groups if products else m + 1):
+                    bent = correction(field, m, n, products, i, j)
+                    here = term(field, m, n, products, i, j)
+                    bend[i, j] = max(bend[i, j], bent.real**2 + bent.imag**2)
+                    value[i, j] = max(value[i, j], here.real**2 + here.imag**2)
+            bend[i, j], value[i, j] = np.sqrt(bend[i, j]), np.sqrt(value[i, j])
+    return bend, value
+
+
+@jit
+def add_even(field, order, share, products, total):
+    """Add corrected values at the centres of pixels without samples to images, times `share`."""
+    groups, rows, columns = field.shape
+    for i in range(rows):
+        for j in range(columns):
+            if order[i, j] > 0:
+                continue
+            for m in range(groups):
+                for n in range(m, groups if products else m + 1):
+                    mean = term(field, m, n, products, i, j) + correction(field, m, n, products, i, j)
+                    total[m * groups + n if products else m, i, j] += share * mean
+                    if n > m:
+                        total[n * groups + m, i, j] += share * complex(mean.real, -mean.imag)
 
 
 @jit

@@ -102,51 +102,54 @@ def averaged(
     (images, groups, rows, columns) complex128, or (images, groups, groups, rows, columns)
         The same bits for any number of cores. Irradiances are on the diagonal of products.
     """
+    from fringetrace.field import pixel_kernels
+
     top, stop = (0, shape[0]) if rows is None else rows
     cut = _around(_crossed(shape, cuts)[top:stop])
     centres = _centres(cut.shape, top, light)
     groups = (light.groups,) if carrier else (light.groups, light.groups)
-    total = np.zeros((1 + max(case.image for case in cases), *groups, *cut.shape), dtype=np.complex128)
-    orders = np.zeros((len(cases), *cut.shape), dtype=np.int64)
+    images = 1 + max(case.image for case in cases)
+    total = np.zeros((images, int(np.prod(groups)), *cut.shape), dtype=np.complex128)
+    orders = np.zeros((len(cases), *cut.shape), dtype=np.int8)
+    slopes: list[FloatArray] = []
     for order, case in zip(orders, cases, strict=True):
         parts = _each(lambda found, case=case: light.field(found, case), centres)  # type: ignore[misc]
         field = np.concatenate([f for f, _ in parts], axis=1).reshape(-1, *cut.shape)
-        slope = np.concatenate([s for _, s in parts]).reshape(*cut.shape, 4)
-        order[:], value = _planned(field, fringes(slope, carrier) / case.wavelength, cut, carrier, more)
-        total[case.image] += case.weight * value
+        if not slopes or any(old is not new for old, (_, new) in zip(slopes, parts, strict=True)):
+            slopes = [slope for _, slope in parts]
+            steepest = fringes(np.concatenate(slopes).reshape(*cut.shape, 4), carrier)
+        order[:] = _planned(field, steepest / case.wavelength, cut, carrier, more)
+        pixel_kernels.add_even(field, order, case.weight, not carrier, total[case.image])
 
     def sampled(band: tuple[int, int]) -> None:
         mine = slice(*band)
-        for order in _distinct(orders[:, mine]):
+        for order in _distinct(orders[:, mine].astype(np.int64)):
             points = samples(order, top + band[0], cuts)
             found = light.at(points, False)
             for its, case in zip(orders[:, mine], cases, strict=True):
                 here = (its == order) & (order > 0)
                 if here.any():
                     field, _ = light.field(found, case)
-                    mean = points.means(field) if carrier else points.products(field)
-                    total[case.image, ..., mine, :] += case.weight * np.where(here, mean, 0.0)
+                    points.add_means(field, here, case.weight, not carrier, total[case.image, ..., mine, :])
 
-    _each(sampled, bands(orders.max(axis=0)))
-    return total
+    _each(sampled, bands(orders.max(axis=0).astype(np.int64)))
+    return total.reshape(-1, *groups, *cut.shape)
 
 
 def _planned(
     field: ComplexArray, cycles: FloatArray, cut: npt.NDArray[np.bool_], carrier: bool, more: int
-) -> tuple[Orders, ComplexArray]:
-    """Gauss points that each pixel asks for; where there are 0, the mean by centre and curvature."""
-    product = mutual_products(field)
-    bend = _curvature(product)
-    even = (cycles <= GENTLE) & ~cut & _small(bend, product)
-    value = product + bend
+) -> Orders:
+    """Gauss points that each pixel asks for; none where its centre and the curvature there will do."""
+    from fringetrace.field import pixel_kernels
+
+    bend, value = pixel_kernels.largest(field, True)
+    even = (cycles <= GENTLE) & ~cut & _small(bend, value)
     if carrier:
-        bent = _curvature(field)
-        even &= _small(bent, field)
-        value = field + bent
+        even &= _small(*pixel_kernels.largest(field, False))
     if more:
         even[:] = False
-    cycles = np.maximum(cycles, np.where(cut, 0.0, _swing(bend, product)))
-    return np.where(even, 0, gauss_order(cycles) + more), np.where(even, value, 0.0)
+    cycles = np.maximum(cycles, np.where(cut, 0.0, _swing(bend, value)))
+    return np.where(even, 0, gauss_order(cycles) + more)
 
 
 def _distinct(orders: Orders) -> Iterator[Orders]:
@@ -175,30 +178,16 @@ def mutual_products(field: ComplexArray) -> ComplexArray:
     return np.asarray(field[:, None] * np.conj(field[None]), dtype=np.complex128)
 
 
-def _curvature(values: ComplexArray) -> ComplexArray:
-    """(f_xx + f_yy) / 24 of images (..., rows, columns), by differences; 0 at the rim."""
-    result = np.zeros_like(values)
-    inner = result[..., 1:-1, 1:-1]
-    np.add(values[..., 2:, 1:-1], values[..., :-2, 1:-1], out=inner)
-    inner += values[..., 1:-1, 2:]
-    inner += values[..., 1:-1, :-2]
-    inner -= 4.0 * values[..., 1:-1, 1:-1]
-    inner /= 24.0
-    return result
-
-
-def _small(bend: ComplexArray, values: ComplexArray) -> npt.NDArray[np.bool_]:
-    """Where a correction (..., rows, columns) is a small part of the largest value around; not at the rim."""
-    bend, values = (np.abs(f).reshape(-1, *f.shape[-2:]).max(axis=0) for f in (bend, values))
-    small = np.zeros(values.shape, dtype=np.bool_)
-    small[1:-1, 1:-1] = (_around(bend) <= BENT * _around(values))[1:-1, 1:-1]
+def _small(bend: FloatArray, value: FloatArray) -> npt.NDArray[np.bool_]:
+    """Where a correction (rows, columns) is a small part of the largest value around; not at the rim."""
+    small = np.zeros(value.shape, dtype=np.bool_)
+    small[1:-1, 1:-1] = (_around(bend) <= BENT * _around(value))[1:-1, 1:-1]
     return small
 
 
-def _swing(bend: ComplexArray, values: ComplexArray) -> FloatArray:
+def _swing(bend: FloatArray, value: FloatArray) -> FloatArray:
     """Cycles a pixel of a cosine that bends as much: (2 pi c)^2 / 24 of the largest value around."""
-    bend, values = (np.abs(f).reshape(-1, *f.shape[-2:]).max(axis=0) for f in (bend, values))
-    part = np.divide(bend, values := _around(values), out=np.zeros_like(values), where=values > 0.0)
+    part = np.divide(bend, value := _around(value), out=np.zeros_like(value), where=value > 0.0)
     return np.asarray(np.sqrt(24.0 * _around(part)) / (2.0 * np.pi), dtype=np.float64)
 
 

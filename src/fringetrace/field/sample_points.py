@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, short_repr
 
 # Gauss points a pixel, along either axis: at least LEAST, for the curvature of a smooth irradiance.
 LEAST, MOST = 2, 32
@@ -88,25 +88,31 @@ class Samples:
     where_x: FloatArray
     where_y: FloatArray
 
+    __repr__ = short_repr
+
     def blank(self, groups: int) -> ComplexArray:
         """Zero field at the sample points, (groups, points)."""
         return np.zeros((groups, len(self.x)), dtype=np.complex128)
 
-    def means(self, field: ComplexArray) -> ComplexArray:
-        """Means of fields (groups, points) over each pixel of the band, (groups, rows, columns)."""
+    def add_means(
+        self, field: ComplexArray, where: npt.NDArray[np.bool_], weight: float, products: bool,
+        total: ComplexArray,
+    ) -> None:  # fmt: skip
+        """Add means over some pixels of the band to images.
+
+        Parameters
+        ----------
+        field : (groups, points) complex128
+        where : (rows, columns) bool
+        weight : float
+        products : bool
+            Means of E_m conj(E_n) instead of those of the fields.
+        total : (groups, rows, columns) complex128, or (groups**2, rows, columns)
+        """
         from fringetrace.field import pixel_kernels
 
-        mean = np.empty((len(field), len(self.first) - 1), dtype=np.complex128)
-        pixel_kernels.means(self.first, self.weight, field, mean)
-        return mean.reshape(len(field), -1, self.columns)
-
-    def products(self, field: ComplexArray) -> ComplexArray:
-        """Means of E_m conj(E_n) of fields (groups, points), (groups, groups, rows, columns)."""
-        from fringetrace.field import pixel_kernels
-
-        mutual = np.empty((len(field), len(field), len(self.first) - 1), dtype=np.complex128)
-        pixel_kernels.products(self.first, self.weight, field, mutual)
-        return mutual.reshape(len(field), len(field), -1, self.columns)
+        add = pixel_kernels.add_mean_products if products else pixel_kernels.add_means
+        add(self.first, self.weight, field, where, weight, total)
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,6 +135,8 @@ class Edges:
     pixel: npt.NDArray[np.int64]
     begin: npt.NDArray[np.int64]
     lines: npt.NDArray[np.int64]
+
+    __repr__ = short_repr
 
 
 def edges(segments: FloatArray, shape: tuple[int, int]) -> Edges:

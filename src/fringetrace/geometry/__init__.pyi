@@ -1,4 +1,5 @@
 from . import forms as forms, meshes as meshes, shapes as shapes
+from .circles import check_circles_apart as check_circles_apart
 from .facet_sag import standoff as standoff
 from .forms import Conic as Conic, Cylinder as Cylinder, Form as Form, Sphere as Sphere
 from .implicit import Fit as Fit, LevelFit as LevelFit, Meeting as Meeting

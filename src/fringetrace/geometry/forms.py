@@ -22,6 +22,7 @@ from fringetrace.core import (
     component,
     dot,
     filled,
+    short_repr,
     unit,
 )
 from fringetrace.geometry.implicit import EPSILON, Fit, fit_level
@@ -69,6 +70,8 @@ class Sphere:
     centre: FloatArray
     radius: float
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Sphere centre"))
         object.__setattr__(self, "radius", _positive(self.radius, "Sphere radius"))
@@ -108,6 +111,8 @@ class Cylinder:
     point: FloatArray
     axis: FloatArray
     radius: float
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "point", checked_vector(self.point, "Cylinder point"))
@@ -161,6 +166,8 @@ class Conic:
     radius: float
     conic: float = 0.0
     terms: tuple[float, ...] = ()
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "vertex", checked_vector(self.vertex, "Conic vertex"))
@@ -249,6 +256,8 @@ class HeightField:
     offset: FloatArray = (0.0, 0.0, 0.0)  # type: ignore[assignment]
     turn: FloatArray | None = None
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         heights = filled(self.heights).copy()
         if heights.ndim != 2 or min(heights.shape) < 4 or not np.isfinite(heights).all():
@@ -321,6 +330,8 @@ class Smooth:
     """
 
     normals: FloatArray | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if self.normals is None:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.core import Array, FloatArray, dot, short_repr, unit
 
 EPSILON = float(np.finfo(np.float64).eps)
 # Vertices this part of the mesh's size off the form are not meant to lie on it.
@@ -32,6 +32,8 @@ class Meeting:
     point: FloatArray
     normal: FloatArray
     face: npt.NDArray[np.int64]
+
+    __repr__ = short_repr
 
 
 class Fit(Protocol):
@@ -99,6 +101,8 @@ class LevelFit:
     sag: float
     complete: bool
     size: float
+
+    __repr__ = short_repr
 
     def guess(self, origin: FloatArray, direction: FloatArray, side: FloatArray) -> FloatArray:
         """Distance (n,) in metres along rays to a quadric, one step from `origin`; NaN if there is none."""

@@ -9,7 +9,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, checked_rotation, checked_vector, filled
+from fringetrace.core import (
+    Array,
+    FloatArray,
+    checked_rotation,
+    checked_vector,
+    described,
+    filled,
+    length_text,
+    short_repr,
+    value_text,
+)
 
 # A face is degenerate when its height is below this part of its longest side: less than what
 # float64 coordinates can express, and far below any needle that still has a normal.
@@ -116,6 +126,8 @@ class Source:
     unit: str | None
     moves: tuple[tuple[FloatArray, FloatArray | None], ...] = ()
 
+    __repr__ = short_repr
+
     def moved(self, offset: FloatArray, turn: FloatArray | None) -> Source:
         """The same origin after one more move."""
         return Source(self.path, self.unit, (*self.moves, (offset, turn)))
@@ -145,6 +157,11 @@ class Mesh:
     faces: npt.NDArray[np.int64]
     name: str = "mesh"
     source: Source | None = field(default=None, repr=False)
+
+    def __repr__(self) -> str:
+        sides = " x ".join(map(length_text, np.subtract(*self.bounds[::-1]).tolist()))
+        counts = f"{len(self.faces):,} triangles, {len(self.vertices):,} vertices"
+        return described(self, value_text(self.name), counts, sides)
 
     def __post_init__(self) -> None:
         vertices = _checked_vertices(self.vertices, self.name)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.core import Array, FloatArray, dot, short_repr, unit
 from fringetrace.geometry.implicit import EPSILON, ROUNDINGS, STEPS, Meeting, advance
 
 # Vertex normals may lean this far (cosine) from a face's: beyond, the mesh has an edge there.
@@ -138,6 +138,8 @@ class Patches:
     sag: float
     size: float
     complete: bool = False
+
+    __repr__ = short_repr
 
     def level(
         self, point: FloatArray, direction: FloatArray, face: Array

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fringetrace.core import ComplexArray
-from fringetrace.field import centred, chosen, light_on
+from fringetrace.field import centred, chosen, complex_field, light_on, mutual_intensity
 from fringetrace.instruments.arms import Mark
-from fringetrace.scene import Beam
+from fringetrace.scene import Beam, Spectrum
 from fringetrace.tracing import Paths
 
 
@@ -29,25 +29,28 @@ def arm_fields(paths: Paths, mark: Mark, wavelength: float, method: str) -> Comp
     """
     if chosen(paths, method) == "rays":
         return ray_sums(paths, mark, wavelength)
-    fields = light_on(paths, wavelength, "wavefront").complex_field(wavelength, mark.count(paths))
+    fields = complex_field(paths, wavelength, groups=mark.count(paths), method=method)
     return _padded(fields, 1)
 
 
-def arm_mutual_intensity(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
-    """Mutual intensity of the counts of a mark, averaged over each pixel, by the wavefront method.
+def arm_mutual_intensity(paths: Paths, mark: Mark, light: float | Spectrum, method: str) -> ComplexArray:
+    """Mutual intensity of the counts of a mark, averaged over each pixel.
 
     Parameters
     ----------
-    paths, mark, wavelength
+    paths, mark
         See `arm_fields`.
+    light : float or Spectrum
+        A wavelength in metres, or several at which light goes the same way.
+    method : {"auto", "facets", "wavefront"}
+        Not the sum of rays, which has no inside of pixels.
 
     Returns
     -------
     (n, n, rows, columns) complex128, n at least 2
         Summed over the components of polarised light.
     """
-    light = light_on(paths, wavelength, "wavefront")
-    return _padded(light.mutual_intensity(wavelength, mark.count(paths)), 2)
+    return _padded(mutual_intensity(paths, light, groups=mark.count(paths), method=method), 2)
 
 
 def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:

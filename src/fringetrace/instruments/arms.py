@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, wavenumber
+from fringetrace.core import ComplexArray, FloatArray, short_repr, wavenumber
 from fringetrace.scene import CCD, pixel_centres
 from fringetrace.tracing import Paths
 
@@ -38,6 +38,8 @@ class Mark:
     branch: int | None = None
     then: int | None = None
     sense: int = 1
+
+    __repr__ = short_repr
 
     def count(self, paths: Paths) -> npt.NDArray[np.int64]:
         """Number of times each path met the marked surface.
@@ -109,6 +111,8 @@ class Arms:
     tilt: tuple[float, float] = (0.0, 0.0)
     sample: int | None = None
     immersion: Material | None = None
+
+    __repr__ = short_repr
 
     def phasors(self, step: float, orders: int) -> ComplexArray:
         """Factors exp(i m delta) by which a phase step multiplies the light of each count m of the mark.

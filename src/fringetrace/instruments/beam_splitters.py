@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fringetrace.core import FloatArray, nm, rotation
+from fringetrace.core import FloatArray, nm, rotation, short_repr
 from fringetrace.geometry import Mesh, plate
 from fringetrace.instruments.layout import real_index
 from fringetrace.optics import Absorber, Dielectric, Film, Material, as_material, refract
@@ -105,6 +105,8 @@ class SplitterPlate:
     back_coating: Film | None = None
     ghosts: bool = True
     design: float = DESIGN
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.thickness) and self.thickness > 0.0):

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fringetrace.accuracy import Budget, budget, checks
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_wavelength
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    checked_wavelength,
+    described,
+    length_text,
+    value_text,
+)
 from fringetrace.field import chosen, products
 from fringetrace.instruments import records
 from fringetrace.instruments.arm_light import add_orders, arm_fields, arm_mutual_intensity, ray_sums
@@ -69,6 +77,20 @@ class Interferometer:
     min_amplitude: float = 1e-6
     # the paths once traced, at which wavelengths, and the light of the last one
     derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        names = [value_text(surface.name) for surface in self.scene.surfaces]
+        (rows, columns), (across, along) = self.ccd.shape, self.beam.shape
+        tilt = ", ".join(f"{1e6 * angle:.4g}" for angle in self.arms.tilt)
+        at = ", ".join("any wavelength" if one is None else length_text(one) for one in self.traced)
+        turned = f" tilted by ({tilt}) urad" if any(self.arms.tilt) else ""
+        return described(
+            self,
+            f"reference {names[self.arms.reference.surface]}{turned}",
+            "" if self.arms.sample is None else f"sample {names[self.arms.sample]}",
+            f"{columns} x {rows} pixels of {length_text(self.ccd.pitch)}, {along} x {across} rays",
+            f"traced at {at}" if self.traced else "not traced",
+        )
 
     def __post_init__(self) -> None:
         count = len(self.scene.surfaces)
@@ -257,8 +279,11 @@ class Interferometer:
             paths = self.trace(light)
             if chosen(paths, self.method) == "rays":  # the fields are kept, too
                 return products(self.fields(light))
-            return arm_mutual_intensity(paths, self.arms.reference, light)
+            return arm_mutual_intensity(paths, self.arms.reference, light, self.method)
         spectrum = self.spectrum(light)
+        paths = self.trace(float(spectrum.wavelengths[0]))
+        if needs(self.scene) is None and chosen(paths, self.method) != "rays":
+            return arm_mutual_intensity(paths, self.arms.reference, spectrum, self.method)
         total = np.zeros((2, 2, *self.ccd.shape), dtype=np.complex128)
         for wavelength, share in zip(spectrum.wavelengths.tolist(), spectrum.weights, strict=True):
             total = add_orders(share * self._mutual(wavelength), total, axes=2)
@@ -314,6 +339,7 @@ class Interferometer:
         -------
         (rows, columns) complex128, or (3, rows, columns) of polarised light
         """
+        self._check(wavelength)
         fields = self.fields(wavelength)
         turns = self.arms.phasors(step, len(fields))
         return np.asarray(np.tensordot(turns, fields, axes=1), dtype=np.complex128)

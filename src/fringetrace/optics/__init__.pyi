@@ -13,6 +13,7 @@ from .elements import (
     Branch as Branch,
     Element as Element,
     IncidentRays as IncidentRays,
+    InterfaceKind as InterfaceKind,
     RealIndex as RealIndex,
 )
 from .film_kernels import (
@@ -26,6 +27,7 @@ from .films import Film as Film, coefficients as coefficients
 from .interfaces import (
     Absorber as Absorber,
     BeamSplitter as BeamSplitter,
+    ConstantInterface as ConstantInterface,
     Dielectric as Dielectric,
     Interface as Interface,
     Metal as Metal,
@@ -35,5 +37,14 @@ from .interfaces import (
 from .materials.material import Material as Material
 from .materials.named_materials import VACUUM as VACUUM, as_material as as_material
 from .phase_plates import PhasePlate as PhasePlate
+from .polarisation import (
+    JONES as JONES,
+    Polarisation as Polarisation,
+    PolarisationLike as PolarisationLike,
+    PolarisationName as PolarisationName,
+    check_polarisation as check_polarisation,
+    checked_jones as checked_jones,
+    jones_states as jones_states,
+)
 from .polarisers import Polariser as Polariser, Retarder as Retarder, wave_plate as wave_plate
 from .pupils import Pupil as Pupil

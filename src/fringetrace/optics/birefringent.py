@@ -14,10 +14,19 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_direction, checked_vector, dot
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    dot,
+    short_repr,
+)
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     RealIndex,
     Waves,
     checked_index,
@@ -110,9 +119,12 @@ class ShearPlate:
     ordinary: RealIndex
     extraordinary: RealIndex
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "ShearPlate axis"))
@@ -226,9 +238,12 @@ class Wollaston:
     extraordinary: RealIndex
     thickness: float = 0.0
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Wollaston centre"))

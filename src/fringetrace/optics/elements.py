@@ -23,12 +23,14 @@ from fringetrace.core import (
     checked_vector,
     component,
     dot,
+    short_repr,
 )
 
 # An axis nearer to a ray than its own rounding has no direction across it.
 PARALLEL = 8.0 * float(np.finfo(np.float64).eps)
 
 RealIndex = float | Callable[[float], float]
+InterfaceKind = Literal["constant", "boundary", "element"]
 Waves = Literal["plane", "curved", "torn"]
 
 
@@ -59,6 +61,8 @@ class IncidentRays:
     field: ComplexArray
     wavelength: float | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Branch:
@@ -80,6 +84,8 @@ class Branch:
     point: FloatArray | None = None
     path: FloatArray | None = None
 
+    __repr__ = short_repr
+
 
 class Element(Protocol):
     """Protocol of thin elements that send rays on in a fixed number of branches.
@@ -87,6 +93,10 @@ class Element(Protocol):
     `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: plane waves
     leave it plane, curved, or torn (neighbouring rays may fare differently).
     """
+
+    @property
+    def kind(self) -> InterfaceKind:
+        """What a surface asks of it: "element"."""
 
     @property
     def waves(self) -> Waves:
@@ -282,10 +292,13 @@ class Annulus:
     inner: float
     outer: float
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "torn"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Annulus centre"))
@@ -339,10 +352,13 @@ class IdealLens:
     focal_length: float
     object_distance: float = np.inf
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "curved"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "IdealLens centre"))

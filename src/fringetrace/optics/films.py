@@ -14,9 +14,20 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, filled
+from fringetrace.core import (
+    ComplexArray,
+    FloatArray,
+    checked_wavelength,
+    described,
+    filled,
+    length_text,
+    short_repr,
+)
 from fringetrace.optics.materials.material import Material
 from fringetrace.optics.materials.named_materials import as_material
+
+# Layers of a film that its representation names.
+NAMED_LAYERS = 4
 
 
 class Amplitudes(NamedTuple):
@@ -27,12 +38,18 @@ class Amplitudes(NamedTuple):
     ts: ComplexArray
     tp: ComplexArray
 
+    def __repr__(self) -> str:
+        return short_repr(self)
+
 
 class PolarisedPowers(NamedTuple):
     """Power fractions of s and p light; arrays of one shape."""
 
     s: FloatArray
     p: FloatArray
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 @dataclass(frozen=True)
@@ -53,6 +70,11 @@ class Film:
     """
 
     layers: tuple[tuple[Material, float], ...] = ()
+
+    def __repr__(self) -> str:
+        if len(self.layers) > NAMED_LAYERS:
+            return described(self, f"{len(self.layers)} layers, {length_text(float(self.thickness.sum()))}")
+        return described(self, *(f"{material.name} {length_text(depth)}" for material, depth in self.layers))
 
     def __post_init__(self) -> None:
         checked = []

@@ -16,10 +16,11 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction, checked_vector, dot
+from fringetrace.core import FloatArray, checked_direction, checked_vector, dot, short_repr
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     Waves,
     deflect,
     move_point,
@@ -95,9 +96,12 @@ class Grating:
     centre: FloatArray | tuple[float, float, float] = (0.0, 0.0, 0.0)
     reflects: bool = False
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Grating axis"))

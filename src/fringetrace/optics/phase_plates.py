@@ -14,10 +14,20 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ROUNDED, FloatArray, checked_direction, checked_vector, component, filled, frame
+from fringetrace.core import (
+    ROUNDED,
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    component,
+    filled,
+    frame,
+    short_repr,
+)
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     Waves,
     checked_number,
     move_point,
@@ -43,6 +53,8 @@ class FormulaRelief:
     gradient: Slopes | None
     step: float | None
 
+    __repr__ = short_repr
+
     def __call__(self, x: FloatArray, y: FloatArray) -> Relief:
         """Path in metres, and its gradient, at points in metres."""
         if self.gradient is not None:
@@ -61,6 +73,8 @@ class PixelRelief:
     pitch: float
     fold: float | None
 
+    __repr__ = short_repr
+
     def __call__(self, x: FloatArray, y: FloatArray) -> Relief:
         """Path in metres, modulo the fold if there is one, and a gradient of 0."""
         rows, columns = self.samples.shape
@@ -77,6 +91,8 @@ class SplineRelief:
 
     samples: FloatArray
     pitch: float
+
+    __repr__ = short_repr
 
     @cached_property
     def fit(self) -> Any:
@@ -148,7 +164,10 @@ class PhasePlate:
     reflects: bool = False
     relief: FormulaRelief | PixelRelief | SplineRelief = field(init=False, repr=False)
 
+    kind: ClassVar[InterfaceKind] = "element"
     polarised: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "PhasePlate centre"))
@@ -247,6 +266,8 @@ class Focusing:
     focal_length: float
     object_distance: float
     index: float
+
+    __repr__ = short_repr
 
     @property
     def distances(self) -> tuple[float, ...]:

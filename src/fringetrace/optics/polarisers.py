@@ -14,10 +14,11 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, filled
+from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, filled, short_repr
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     RealIndex,
     Waves,
     checked_index,
@@ -55,10 +56,13 @@ class Polariser:
     axis: FloatArray
     extinction: float = 0.0
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Polariser axis"))
@@ -99,9 +103,12 @@ class Retarder:
     retardance: float | Callable[[float], float]
     design: float | None = None
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Retarder axis"))
@@ -171,6 +178,8 @@ class Birefringence:
     extraordinary: RealIndex
     thickness: float
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         checked_index(self.ordinary, "Birefringence ordinary index")
         checked_index(self.extraordinary, "Birefringence extraordinary index")
@@ -222,10 +231,13 @@ class JonesPlate:
     matrix: ComplexArray
     axis: FloatArray
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrix", _checked_matrix(self.matrix))

@@ -8,10 +8,11 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction, dot
+from fringetrace.core import FloatArray, checked_direction, dot, short_repr
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     Waves,
     checked_number,
     rotate_vector,
@@ -41,10 +42,13 @@ class Pupil:
     aperture: float
 
     # a plane wave has one direction: all of it passes, or none
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "axis", checked_direction(self.axis, "Pupil axis"))

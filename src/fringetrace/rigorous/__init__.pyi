@@ -6,5 +6,5 @@ from . import (
 )
 from .cylinder_gratings import reflectance_spectrum as reflectance_spectrum
 from .cylinders import Cylinders as Cylinders, differential_width as differential_width, scatter as scatter
-from .cylindrical_waves import CONDUCTOR as CONDUCTOR, Index as Index, Polarisation as Polarisation
+from .cylindrical_waves import CONDUCTOR as CONDUCTOR, Index as Index
 from .ray_validity import Validity as Validity, validity as validity

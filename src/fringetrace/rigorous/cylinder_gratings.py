@@ -18,12 +18,19 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_lengths, checked_whole
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    checked_angles,
+    checked_lengths,
+    checked_whole,
+    short_repr,
+)
+from fringetrace.optics import Polarisation, check_polarisation
 from fringetrace.rigorous.cylindrical_waves import (
     Index,
-    Polarisation,
     boundary,
-    check_polarisation,
     indices_at,
     lattice_sums,
     truncation,
@@ -53,6 +60,8 @@ class Row:
     radius: float
     index: Index
     offset: float = 0.0
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True)
@@ -84,6 +93,8 @@ class CylinderGratings:
     host: Index
     front: Index = 1.0
     back: Index | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if not (0 < self.pitch < math.inf and 0 < self.thickness < math.inf):
@@ -118,6 +129,9 @@ class Diffraction(NamedTuple):
     reflectance: FloatArray
     transmittance: FloatArray
 
+    def __repr__(self) -> str:
+        return short_repr(self)
+
 
 class _Section(NamedTuple):
     """Scattering matrices between plane waves (..., g, g): from above back and on, from below back and on."""
@@ -142,14 +156,14 @@ class _Light(NamedTuple):
         return np.where(abs(found) < _GRAZING * abs(k), _GRAZING * abs(k), found)
 
     def flux(self, index: ComplexArray) -> ComplexArray:
-        """Wavenumbers across over 1 ("E") or the square of the index ("H"): what keeps flux continuous."""
+        """Wavenumbers across over 1 ("s") or the square of the index ("p"): what keeps flux continuous."""
         across = self.across(index)
-        return across if self.polarisation == "E" else across / index[..., None] ** 2
+        return across if self.polarisation == "s" else across / index[..., None] ** 2
 
 
 def diffract(
     lattice: CylinderGratings, wavelength: ArrayLike, angle: ArrayLike = 0.0,
-    polarisation: Polarisation = "E", orders: int | None = None, harmonics: int | None = None,
+    polarisation: Polarisation = "s", orders: int | None = None, harmonics: int | None = None,
 ) -> Diffraction:  # fmt: skip
     """Diffraction of a plane wave from the front by a lattice of cylinders.
 
@@ -160,7 +174,7 @@ def diffract(
         In vacuum; broadcasts with `angle`.
     angle : float or array, radians
         Of incidence, in the front medium.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
         The field along the cylinders.
     orders : int, optional
         Highest diffraction order G; by default those that propagate and 7 more, on either side.
@@ -223,7 +237,7 @@ def reflectance_spectrum(
         In vacuum; broadcasts with `angle`.
     angle : float or array, radians
         Of incidence, in the front medium.
-    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
+    polarisation : ``"s"``, ``"p"`` or ``"unpolarised"``
         The last is the mean of the two others.
     method : ``"rods"`` or ``"multilayer"``
         Rigorous, or flat layers of effective index: quicker, without diffraction orders, some 5 % off.
@@ -238,8 +252,8 @@ def reflectance_spectrum(
         If the method or the polarisation is unknown.
     """
     if polarisation == "unpolarised":
-        e = reflectance_spectrum(lattice, wavelength, angle, "E", method)
-        h = reflectance_spectrum(lattice, wavelength, angle, "H", method)
+        e = reflectance_spectrum(lattice, wavelength, angle, "s", method)
+        h = reflectance_spectrum(lattice, wavelength, angle, "p", method)
         return SlabPowers((e.reflectance + h.reflectance) / 2.0, (e.transmittance + h.transmittance) / 2.0)
     check_polarisation(polarisation)
     if method == "multilayer":

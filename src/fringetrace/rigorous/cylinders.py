@@ -1,7 +1,7 @@
 """Rigorous scattering by parallel circular cylinders: cylindrical waves and multiple scattering.
 
 Everything lies in the plane across the cylinders, x and y; light travels in that plane. Polarisation
-``"E"`` has the electric field along the cylinders, ``"H"`` the magnetic field; that field component is
+``"s"`` has the electric field along the cylinders, ``"p"`` the magnetic field; that field component is
 the wave u. Outside a cylinder j, with polar coordinates about its centre,
 
     u = sum_n [a_jn J_n(k r) + b_jn H_n(k r)] exp(i n phi),    b_jn = S_jn a_jn,
@@ -20,11 +20,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_angles, checked_whole, short_repr
+from fringetrace.geometry import check_circles_apart
+from fringetrace.optics import Polarisation
 from fringetrace.rigorous.cylindrical_waves import (
     CONDUCTOR as CONDUCTOR,
     Index,
-    Polarisation,
     boundary,
     checked_index,
     damped,
@@ -60,6 +61,8 @@ class Cylinders:
     index: Index | Sequence[Index]
     host: Index = 1.0
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         centres = np.atleast_2d(np.asarray(self.centres, np.float64))
         if centres.ndim != 2 or centres.shape[1] != 2 or len(centres) == 0:
@@ -75,7 +78,7 @@ class Cylinders:
         for index in (*several, self.host):
             if not callable(index):
                 checked_index(index, "Cylinders")
-        _check_apart(centres, radii)
+        check_circles_apart(centres, radii, "Cylinders")
         object.__setattr__(self, "centres", centres)
         object.__setattr__(self, "radii", radii)
 
@@ -87,6 +90,9 @@ class Widths(NamedTuple):
     scattering: FloatArray
     absorption: FloatArray
 
+    def __repr__(self) -> str:
+        return short_repr(self)
+
 
 @dataclass(frozen=True)
 class Scattered:
@@ -97,7 +103,7 @@ class Scattered:
     cylinders : Cylinders
     wavelength : float, metres
         In vacuum.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     angle : (q,) float64, radians
         Where the incident waves travel to, from +x towards +y.
     exciting, outgoing : (q, n, 2 N + 1) complex128
@@ -110,6 +116,8 @@ class Scattered:
     angle: FloatArray
     exciting: ComplexArray
     outgoing: ComplexArray
+
+    __repr__ = short_repr
 
     @property
     def wavenumber(self) -> float:
@@ -137,7 +145,7 @@ def scattering_coefficients(
         n + i kappa; `CONDUCTOR` for a perfect conductor.
     host : float or array
         Refractive index around.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     orders : int
         N.
 
@@ -164,7 +172,7 @@ def efficiencies(
 
 
 def scatter(
-    cylinders: Cylinders, wavelength: float, angle: ArrayLike = 0.0, polarisation: Polarisation = "E",
+    cylinders: Cylinders, wavelength: float, angle: ArrayLike = 0.0, polarisation: Polarisation = "s",
     orders: int | None = None,
 ) -> Scattered:  # fmt: skip
     """Scattering of plane waves by a cluster of cylinders, with multiple scattering.
@@ -179,7 +187,7 @@ def scatter(
         In vacuum.
     angle : float or (q,), radians
         Where the waves travel to, from +x towards +y.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
     orders : int, optional
         N; by default `truncation` of the largest cylinder.
 
@@ -274,7 +282,7 @@ def near_field(scattered: Scattered, points: ArrayLike) -> ComplexArray:
     Returns
     -------
     (q, p) complex128
-        The electric ("E") or magnetic ("H") field along the cylinders, over the incident amplitude.
+        The electric ("s") or magnetic ("p") field along the cylinders, over the incident amplitude.
     """
     points = np.atleast_2d(np.asarray(points, np.float64))
     k, cylinders = scattered.wavenumber, scattered.cylinders
@@ -338,21 +346,6 @@ def _indices(cylinders: Cylinders, wavelength: float) -> ComplexArray:
     """Refractive index of each cylinder at a wavelength, (n,) complex128."""
     values = [indices_at(index, np.asarray(wavelength)) for index in _each(cylinders.index)]
     return np.broadcast_to(np.asarray(values, np.complex128), (len(np.asarray(cylinders.centres)),))
-
-
-def _check_apart(centres: FloatArray, radii: FloatArray) -> None:
-    """Raise ValueError if cylinders overlap."""
-    from scipy.spatial import cKDTree
-
-    pairs = cKDTree(centres).query_pairs(2.0 * radii.max(), output_type="ndarray")
-    i, j = pairs.T
-    gap = np.hypot(*(centres[i] - centres[j]).T) - radii[i] - radii[j]
-    if np.any(gap < 0):
-        worst = gap.argmin()
-        raise ValueError(
-            f"Cylinders: expected them apart, got {i[worst]} and {j[worst]} "
-            f"overlapping by {-gap[worst]:.3g} m"
-        )
 
 
 def _chunks(count: int, width: int) -> list[slice]:

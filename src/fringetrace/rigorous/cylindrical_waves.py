@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fringetrace.core import Array, ComplexArray, FloatArray, checked_lengths, checked_whole
+from fringetrace.optics import Polarisation, check_polarisation
 
-Polarisation = Literal["E", "H"]
 Index = complex | Callable[[Any], Any]
 
 CONDUCTOR: complex = complex(math.inf)  # the index of a perfect conductor
@@ -67,12 +67,6 @@ def indices_at(index: Index, wavelength: FloatArray) -> ComplexArray:
     return np.broadcast_to(checked_index(value, "Index"), wavelength.shape)
 
 
-def check_polarisation(polarisation: str) -> None:
-    """Check that the polarisation is "E" or "H"; else ValueError."""
-    if polarisation not in ("E", "H"):
-        raise ValueError(f"Polarisation: expected 'E' or 'H', got {polarisation!r}")
-
-
 def boundary(
     radius: ArrayLike, index: ArrayLike, host: ArrayLike, wavelength: ArrayLike, polarisation: Polarisation,
     orders: int,
@@ -87,7 +81,7 @@ def boundary(
         n + i kappa; `CONDUCTOR` for a perfect conductor.
     host : float or array
         Refractive index around.
-    polarisation : ``"E"`` or ``"H"``
+    polarisation : ``"s"`` or ``"p"``
         The field along the cylinder.
     orders : int
         N.
@@ -130,10 +124,10 @@ def boundary(
     (j, dj), (h, dh) = _with_derivative(j, n / x), _with_derivative(h, n / x)
     rest = inside[..., :-1] - n[1:-1] / z[..., None]
     slope = np.concatenate([-1.0 / inside[..., :1], rest], -1)  # J_n' / J_n
-    slope = slope * (contrast if polarisation == "E" else 1.0 / contrast)
+    slope = slope * (contrast if polarisation == "s" else 1.0 / contrast)
     below = slope * h - dh
     response = -(slope * j - dj) / below
-    hard = -j / h if polarisation == "E" else -dj / dh
+    hard = -j / h if polarisation == "s" else -dj / dh
     response = np.where(conducting, hard, response)
     within = np.where(conducting, 0.0, -2j / (math.pi * x) / below)
     order = np.arange(-orders, orders + 1)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fringetrace.core import Array, ComplexArray, checked_angles
+from fringetrace.core import Array, ComplexArray, checked_angles, short_repr
 from fringetrace.rigorous.cylindrical_waves import LARGEST, checked_index, truncation
 
 
@@ -20,6 +20,9 @@ class Efficiencies(NamedTuple):
     absorption: float
     backscattering: float
     asymmetry: float
+
+    def __repr__(self) -> str:
+        return short_repr(self)
 
 
 def mie_coefficients(

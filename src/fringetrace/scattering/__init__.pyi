@@ -7,7 +7,7 @@ from .detectors import (
     sides as sides,
     towards as towards,
 )
-from .far_fields import far_field as far_field
+from .far_fields import FarFieldOptions as FarFieldOptions, far_field as far_field
 from .goniometer import (
     amplitudes as amplitudes,
     brdf as brdf,
@@ -17,4 +17,9 @@ from .goniometer import (
 )
 from .illumination import Illumination as Illumination, footprint as footprint
 from .rod_lattice import RodLattice as RodLattice
-from .rod_studies import Polarised as Polarised, cluster as cluster, specular as specular, study as study
+from .rod_solvers import (
+    lattice_cylinders as lattice_cylinders,
+    lattice_gratings as lattice_gratings,
+    lattice_validity as lattice_validity,
+)
+from .rod_studies import cluster as cluster, specular as specular, study as study

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray
+from fringetrace.core import Array, FloatArray, short_repr
 from fringetrace.geometry import IndexArray
 from fringetrace.scene import CCD
 from fringetrace.tracing import Fate, Paths, project
@@ -161,6 +161,8 @@ class Cones:
     half_angle: float
     phi: FloatArray = field(default_factory=lambda: np.zeros(1))
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         if not (isinstance(self.half_angle, Real) and 0.0 < self.half_angle < 0.5 * np.pi):
             raise ValueError(
@@ -211,6 +213,8 @@ class Cells:
     sectors: int
     theta: FloatArray = field(init=False)
     phi: FloatArray = field(init=False)
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for count, what in ((self.rings, "rings"), (self.sectors, "sectors")):
@@ -273,6 +277,8 @@ class Pixels:
     distance: float
     width: float
     phi: FloatArray = field(default_factory=lambda: np.zeros(1))
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "theta", checked_angles(self.theta, "Pixels theta", 0.5 * np.pi))

@@ -11,15 +11,14 @@ import numpy.typing as npt
 
 from fringetrace.accuracy import hit_error
 from fringetrace.core import FloatArray, FringetraceWarning, array, checked_wavelengths
+from fringetrace.optics import PolarisationLike, jones_states
 from fringetrace.scattering.detectors import Cells, Cones, Detector, Pixels, checked_angles
-from fringetrace.scattering.far_fields import FATES, Far, far_field, mean, warn_of_losses
+from fringetrace.scattering.far_fields import FATES, Far, FarFieldOptions, far_field, mean, warn_of_losses
 from fringetrace.scattering.illumination import (
     Illumination,
-    Polarisation,
     SourceFunction,
     footprint,
     scene_validity,
-    states,
 )
 from fringetrace.scene import Scene
 from fringetrace.tracing import Fate, needs, trace
@@ -117,7 +116,7 @@ def amplitudes(
     rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
     source: SourceFunction | None = None,
-    polarisation: Polarisation = None,
+    polarisation: PolarisationLike = None,
     **options: Any,
 ) -> DataArray:
     """Complex far-field amplitudes from each direction into each: the BRDF before squaring.
@@ -142,13 +141,13 @@ def amplitudes(
     theta, phi = _angles(incidence)
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
-    lighting = Illumination(scene, aperture, rays, centre, source)
-    lights = states(polarisation, (len(theta), len(phi)))
+    lighting, summed = Illumination(scene, aperture, rays, centre, source), FarFieldOptions(method, **options)
+    lights = jones_states(polarisation, (len(theta), len(phi)), "goniometer")
     if len(lights[0]) > 1:
         raise ValueError(f"amplitudes polarisation: expected one state of light, got {polarisation!r}")
     pairs = [(t, p) for t in theta for p in phi]
     fars = [
-        far_field(lighting, *pair, detector, waves, method=method, jones=jones, **options)
+        far_field(lighting, *pair, detector, waves, summed, jones=jones)
         for pair, (jones,) in zip(pairs, lights, strict=True)
     ]
     warn_of_losses(fars, set())
@@ -172,7 +171,7 @@ def brdf(
     rays: tuple[int, int] = RAYS,
     centre: npt.ArrayLike | None = None,
     source: SourceFunction | None = None,
-    polarisation: Polarisation = None,
+    polarisation: PolarisationLike = None,
     reciprocal: bool = False,
     progress: Callable[[int, int], None] | None = None,
     warned: set[str] | None = None,
@@ -254,11 +253,11 @@ def brdf(
     theta, phi = _angles(incidence)
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
-    lighting = Illumination(scene, aperture, rays, centre, source)
+    lighting, summed = Illumination(scene, aperture, rays, centre, source), FarFieldOptions(method, **options)
     if method == "diffraction":
         _check_spacing(lighting, waves)
     pairs = [(t, p) for t in theta for p in phi]
-    lights = states(polarisation, (len(theta), len(phi)))
+    lights = jones_states(polarisation, (len(theta), len(phi)), "goniometer")
     if reciprocal:
         _check_same(theta, phi, detector)
         if polarisation is not None and len(lights[0]) == 1:
@@ -268,7 +267,7 @@ def brdf(
     for i, (t, p) in enumerate(pairs):
         chosen = order >= i if reciprocal else None
         each = [
-            far_field(lighting, t, p, detector, waves, method=method, jones=jones, chosen=chosen, **options)
+            far_field(lighting, t, p, detector, waves, summed, jones=jones, chosen=chosen)
             for jones in lights[i]
         ]
         fars.append(mean(each))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_length
+from fringetrace.core import FloatArray, checked_length, short_repr
 from fringetrace.geometry import breadth
 from fringetrace.rigorous import CONDUCTOR, Index, Validity, validity
 from fringetrace.scattering.detectors import sides, towards
@@ -16,49 +16,6 @@ from fringetrace.scene import Beam, Scene
 from fringetrace.tracing import Rays, launch
 
 SourceFunction = Callable[[float, float], Beam | Rays]
-# None: light of one number a ray. A name, or amplitudes of s and p, one pair or one an incidence.
-Polarisation = str | npt.ArrayLike | None
-# Amplitudes of s and p; of several the powers' mean is taken.
-NAMED = {"s": ((1, 0),), "p": ((0, 1),), "unpolarised": ((1, 0), (0, 1))}
-
-
-def states(polarisation: Polarisation, shape: tuple[int, int]) -> list[tuple[ComplexArray | None, ...]]:
-    """Jones vectors whose powers make up a polarisation, for each incidence.
-
-    Parameters
-    ----------
-    polarisation : None, "s", "p", "unpolarised", or (2,) or (theta, phi, 2) complex
-    shape : (theta, phi)
-        Counts of incidences.
-
-    Returns
-    -------
-    list of tuples of (2,) complex128, or None for light of one number a ray
-        Amplitudes of s and p; an incidence after the other, theta-major.
-
-    Raises
-    ------
-    ValueError
-        For another name or shape, numbers that are not finite, or amplitudes that are both 0.
-    """
-    count = shape[0] * shape[1]
-    if polarisation is None:
-        return [(None,)] * count
-    if isinstance(polarisation, str):
-        if polarisation not in NAMED:
-            raise ValueError(
-                f"goniometer polarisation: expected {', '.join(NAMED)} or amplitudes, got {polarisation!r}"
-            )
-        return [tuple(np.array(one, np.complex128) for one in NAMED[polarisation])] * count
-    given = np.asarray(polarisation, dtype=np.complex128)
-    if given.shape not in ((2,), (*shape, 2)):
-        raise ValueError(
-            f"goniometer polarisation: expected amplitudes of s and p of shape (2,) or {(*shape, 2)}, "
-            f"got {given.shape}"
-        )
-    if not (np.isfinite(given).all() and given.any(axis=-1).all()):
-        raise ValueError("goniometer polarisation: expected finite amplitudes, not both 0, got others")
-    return [(one,) for one in np.broadcast_to(given, (*shape, 2)).reshape(-1, 2)]
 
 
 def scene_validity(scene: Scene, wavelength: float) -> Validity:
@@ -157,6 +114,8 @@ class Illumination:
     rays: tuple[int, int] = (256, 256)
     centre: npt.ArrayLike | None = None
     source: SourceFunction | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         low, high = self.bounds

@@ -1,4 +1,4 @@
-"""Rod lattices: positions, materials, and their scenes for ray tracing and rigorous solvers."""
+"""Rod lattices: positions, materials, mesh and scene; see `rod_solvers` for rigorous solutions."""
 
 from __future__ import annotations
 
@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import FloatArray, checked_length
-from fringetrace.geometry import Cylinder, Mesh, plate, rod_lattice
+from fringetrace.core import FloatArray, checked_length, short_repr
+from fringetrace.geometry import Cylinder, Mesh, check_circles_apart, plate, rod_lattice
 from fringetrace.optics import VACUUM, Absorber, Dielectric, Mirror, as_material
-from fringetrace.rigorous import CONDUCTOR, Cylinders, Index, Validity, validity
 from fringetrace.scene import Scene, Surface
 
 if TYPE_CHECKING:
     from fringetrace.optics import Material
-    from fringetrace.rigorous import cylinder_gratings
 
 # Distance of the rows in pitches, and how far every second one is shifted.
 ARRANGEMENTS = {"square": (1.0, 0.0), "staggered": (1.0, 0.5), "hexagonal": (0.5 * np.sqrt(3.0), 0.5)}
@@ -80,6 +78,8 @@ class RodLattice:
     cortex: float = 0.0
     channel: float | None = None
     exact: bool = False
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         if self.arrangement not in ARRANGEMENTS:
@@ -171,69 +171,11 @@ class RodLattice:
         (low, _, _), (high, _, _) = self.mesh.bounds
         return float(high - low), length
 
-    @property
-    def cylinders(self) -> Cylinders:
-        """The rods as `rigorous.Cylinders`, x and z there x and y; the host is infinite."""
-        count = len(self.centres), len(self.channels)
-        radii = np.repeat([self.radius, self.channel or 0.0], count)
-        index = [self._index] * count[0] + [1.0] * count[1]
-        return Cylinders(np.concatenate([self.centres, self.channels]), radii, index, self._around)
-
-    @property
-    def endless(self) -> cylinder_gratings.CylinderGratings:
-        """The rows as a `rigorous.cylinder_gratings` lattice, infinite along x, on the host.
-
-        Raises
-        ------
-        ValueError
-            With disorder.
-        """
-        from fringetrace.rigorous import cylinder_gratings
-
-        if self.disorder:
-            raise ValueError(f"endless rows: expected no disorder, got {self.disorder}")
-        shift = ARRANGEMENTS[self.arrangement][1]
-        depth = self.cortex + self.radius + self.gap * np.arange(self.rows)[::-1]
-        rows = [
-            cylinder_gratings.Row(float(d), self.radius, self._index, shift * (j % 2) * self.pitch)
-            for j, d in enumerate(depth)
-        ]
-        if self.channel is not None:
-            rows += [
-                cylinder_gratings.Row(float(d), self.channel, 1.0, 0.5 * (1.0 + shift) * self.pitch)
-                for d in 0.5 * (depth[1:] + depth[:-1])
-            ]
-        return cylinder_gratings.CylinderGratings(
-            self.pitch, float(depth[0]) + 2.0 * self.radius, rows, self._around
-        )
-
-    def validity(self, wavelength: float) -> Validity:
-        """Validity of ray optics for one rod, see `fringetrace.validity`.
-
-        Parameters
-        ----------
-        wavelength : float, metres
-        """
-        index = CONDUCTOR if self.rod is None else self.rod.index
-        return validity(self.radius, wavelength, index, self._around)
-
-    @property
-    def _around(self) -> Index:
-        return 1.0 if self.host is None else self.host.index
-
-    @property
-    def _index(self) -> Index:
-        if self.rod is not None:
-            return self.rod.index
-        if self.reflectance != 1.0:
-            raise ValueError(f"rigorous methods: expected mirrors of reflectance 1, got {self.reflectance}")
-        return CONDUCTOR
-
     def _check_apart(self) -> None:
         """Matter may not overlap."""
         if self.rod is not None or self.channel is not None:
             radii = np.repeat([self.radius, self.channel or 0.0], (len(self.centres), len(self.channels)))
-            Cylinders(np.concatenate([self.centres, self.channels]), radii, 1.0)
+            check_circles_apart(np.concatenate([self.centres, self.channels]), radii, "rods")
 
 
 def _prisms(lattice: RodLattice, centres: FloatArray, radius: float, name: str) -> Mesh:

@@ -6,17 +6,19 @@ import os
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import FloatArray, array, checked_wavelengths, degree, grid, sweep, warn
-from fringetrace.rigorous import Polarisation, differential_width, reflectance_spectrum, scatter
+from fringetrace.optics import Polarisation, PolarisationName
+from fringetrace.rigorous import differential_width, reflectance_spectrum, scatter
 from fringetrace.scattering.detectors import Cones, checked_angles
 from fringetrace.scattering.far_fields import FATES
 from fringetrace.scattering.goniometer import AXES, METHODS, brdf
 from fringetrace.scattering.rod_lattice import MEDIA, RodLattice as RodLattice
+from fringetrace.scattering.rod_solvers import lattice_cylinders, lattice_gratings, lattice_validity
 from fringetrace.tracing import CUT, CUT_OFF
 
 if TYPE_CHECKING:
@@ -25,18 +27,17 @@ if TYPE_CHECKING:
     from fringetrace.optics import Material
 
 
-Polarised = Polarisation | Literal["unpolarised"]
 # Surfaces that light may meet, and the least amplitude of a branch.
 BOUNCES, FAINT = 100, 1e-3
 # Materials by name and by index at the wavelengths: names alone do not tell them apart.
 Media = Mapping[tuple[str | None, bytes], "Material"]
-# The field along the rods, as the goniometer says it; s light has the amplitudes of one number a ray.
-ALONG = {"E": None, "H": "p", "unpolarised": "unpolarised"}
+# As the goniometer traces it: s light stays s across rods, and one number a ray has its amplitudes.
+TRACED = {"s": None, "p": "p", "unpolarised": "unpolarised"}
 
 
 def _cell(
     theta_i: npt.ArrayLike, theta_o: npt.ArrayLike, half_angle: float, wavelengths: npt.ArrayLike,
-    method: str, polarisation: Polarised, rays: int, max_bounces: int, min_amplitude: float,
+    method: str, polarisation: PolarisationName, rays: int, max_bounces: int, min_amplitude: float,
     indices: npt.NDArray[np.complex128], media: Media, **parameters: Any,
 ) -> dict[str, FloatArray]:  # fmt: skip
     """One lattice: its BRDF in the plane across the rods, and where the power went."""
@@ -48,7 +49,7 @@ def _cell(
         return {"brdf": values[:, None, :, None], **dict.fromkeys(FATES, unknown)}
     table = brdf(
         lattice.scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths, method=method,
-        polarisation=ALONG[polarisation], rays=(1, rays), max_bounces=max_bounces,
+        polarisation=TRACED[polarisation], rays=(1, rays), max_bounces=max_bounces,
         min_amplitude=min_amplitude, threads=1, warned={CUT_OFF}, **lattice.lighting,
     )  # fmt: skip
     return {"brdf": table.values, **{name: table[name].values for name in FATES}}
@@ -59,7 +60,7 @@ def cluster(
     theta_i: npt.ArrayLike,
     theta_o: npt.ArrayLike,
     wavelengths: npt.ArrayLike,
-    polarisation: Polarised = "E",
+    polarisation: PolarisationName = "s",
 ) -> FloatArray:
     """BRDF of a finite lattice in the plane across its rods, by rigorous multiple scattering.
 
@@ -70,13 +71,13 @@ def cluster(
 
     Parameters
     ----------
-    lattice : Lattice
+    lattice : RodLattice
         Rods may not overlap.
     theta_i, theta_o : (n,) radians
         Position angles, outside of the host.
     wavelengths : (w,) float64, metres
-    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
-        The field along the rods; the mean of both.
+    polarisation : ``"s"``, ``"p"`` or ``"unpolarised"``
+        The electric field along the rods, or across them; the mean of both.
 
     Returns
     -------
@@ -91,7 +92,7 @@ def cluster(
         e, h = (cluster(lattice, theta_i, theta_o, wavelengths, each) for each in get_args(Polarisation))
         return 0.5 * (e + h)
     start, end = checked_angles(theta_i, "cluster theta_i"), checked_angles(theta_o, "cluster theta_o")
-    rods, (width, _) = lattice.cylinders, lattice.footprint
+    rods, (width, _) = lattice_cylinders(lattice), lattice.footprint
     values = []
     for wave in checked_wavelengths(wavelengths):
         host = 1.0 if lattice.host is None else float(lattice.host.index(wave).real)
@@ -110,7 +111,7 @@ def _through(host: float, angle: FloatArray, polarisation: Polarisation) -> tupl
     """Angles inside of a host, and the parts of the power that pass its face."""
     inside = np.arcsin(np.sin(angle) / host)
     here, there = np.cos(angle), host * np.cos(inside)
-    if polarisation == "H":
+    if polarisation == "p":
         here, there = here * host, there / host
     return inside, 4.0 * here * there / (here + there) ** 2
 
@@ -121,19 +122,19 @@ def specular(
     wavelengths: npt.ArrayLike,
     *,
     method: str = "rods",
-    polarisation: Polarised = "unpolarised",
+    polarisation: PolarisationName = "unpolarised",
 ) -> DataArray:
     """Specular reflectance of a lattice with infinite rows, rigorously or as a multilayer.
 
     Parameters
     ----------
-    lattice : Lattice
+    lattice : RodLattice
         Without disorder; its columns do not matter.
     theta_i : (n,) radians
         From where, outside of the host.
     wavelengths : (w,) float64, metres
     method, polarisation
-        See `lattices.reflectance_spectrum`.
+        See `cylinder_gratings.reflectance_spectrum`.
 
     Returns
     -------
@@ -144,10 +145,10 @@ def specular(
     Raises
     ------
     ValueError
-        As `Lattice.endless` and `lattices.reflectance_spectrum`.
+        As `lattice_gratings` and `cylinder_gratings.reflectance_spectrum`.
     """
     start, waves = checked_angles(theta_i, "specular theta_i"), checked_wavelengths(wavelengths)
-    found = reflectance_spectrum(lattice.endless, waves, start[:, None], polarisation, method)
+    found = reflectance_spectrum(lattice_gratings(lattice), waves, start[:, None], polarisation, method)
     axes = ("theta_i", "wavelength")
     coordinates = {
         "theta_i": ("theta_i", start, {"units": "rad"}),
@@ -166,7 +167,9 @@ def specular(
 
 def validity_attributes(kinds: Sequence[RodLattice], waves: FloatArray) -> dict[str, float | str]:
     """Validity attributes for the smallest of some rods at the longest of some wavelengths."""
-    return min((kind.validity(waves.max()) for kind in kinds), key=lambda v: v.size_parameter).attributes
+    return min(
+        (lattice_validity(kind, waves.max()) for kind in kinds), key=lambda v: v.size_parameter
+    ).attributes
 
 
 def _spoken(lattice: RodLattice) -> dict[str, Any]:
@@ -196,7 +199,7 @@ def study(
     *,
     half_angle: float = 1.0 * degree,
     method: str = "rays",
-    polarisation: Polarised = "E",
+    polarisation: PolarisationName = "s",
     rays: int = 2000,
     max_bounces: int = BOUNCES,
     min_amplitude: float = FAINT,
@@ -207,7 +210,7 @@ def study(
 
     Parameters
     ----------
-    lattice : Lattice
+    lattice : RodLattice
         What stays the same.
     axes : dict of sequences
         Values of each parameter that changes, by the names of `RodLattice`; every combination is traced.
@@ -220,8 +223,8 @@ def study(
         See `goniometer.brdf`; or "rods": the rigorous answer in the same unit, see `cluster`. It has no
         use for half angle, rays and bounces, and does not say where the power went (NaN). For endless
         rows, and as a multilayer, see `specular`.
-    polarisation : ``"E"``, ``"H"`` or ``"unpolarised"``
-        The field along the rods; the mean of both takes twice the time.
+    polarisation : ``"s"``, ``"p"`` or ``"unpolarised"``
+        The electric field along the rods, or across them; the mean of both takes twice the time.
     rays : int
         Across the lattice.
     min_amplitude : float
@@ -252,8 +255,8 @@ def study(
             raise ValueError(f"lattice study: expected parameters among {', '.join(known)}, got {name!r}")
     if method not in (*METHODS, "rods"):
         raise ValueError(f"lattice study method: expected {', '.join(METHODS)} or rods, got {method!r}")
-    if polarisation not in ALONG:
-        raise ValueError(f"lattice study polarisation: expected {', '.join(ALONG)}, got {polarisation!r}")
+    if polarisation not in TRACED:
+        raise ValueError(f"lattice study polarisation: expected {', '.join(TRACED)}, got {polarisation!r}")
     incidence, waves = checked_angles(theta_i, "lattice study theta_i"), checked_wavelengths(wavelengths)
     observation = checked_angles(theta_o, "lattice study theta_o")
     fixed = {

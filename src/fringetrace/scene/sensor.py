@@ -8,7 +8,15 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, checked_direction, checked_vector, frame
+from fringetrace.core import (
+    FloatArray,
+    checked_direction,
+    checked_vector,
+    described,
+    frame,
+    length_text,
+    value_text,
+)
 from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive
 
 
@@ -46,6 +54,15 @@ class CCD:
     shape: tuple[int, int]
     focus: float = 0.0
     axes: PlaneAxes = field(init=False, repr=False)  # of columns, rows, and the normal
+
+    def __repr__(self) -> str:
+        rows, columns = self.shape
+        return described(
+            self,
+            f"{columns} x {rows} pixels of {length_text(self.pitch)}",
+            f"centre {value_text(self.centre)} m, normal {value_text(self.axes[2])}",
+            f"focused {length_text(self.focus)} in front" if self.focus else "",
+        )
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "CCD centre"))

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
 from fringetrace.core import (
-    ROUNDED,
     ComplexArray,
     FloatArray,
     checked_direction,
     checked_vector,
-    filled,
+    described,
     frame,
+    length_text,
+    value_text,
 )
+from fringetrace.optics import checked_jones
 from fringetrace.scene.planes import PlaneAxes, checked_grid, checked_positive, checked_size
 
 
@@ -62,17 +63,6 @@ def as_names(names: str | Iterable[str]) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _checked_jones(value: Any) -> ComplexArray:
-    try:
-        vector: ComplexArray = filled(value, np.complex128).copy()
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"Beam polarisation: expected two numbers, got {value!r}") from error
-    size = float(np.linalg.norm(vector)) if vector.shape == (2,) else np.nan
-    if not (np.isfinite(size) and size > 0.0):
-        raise ValueError(f"Beam polarisation: expected a Jones vector of two numbers, got {value!r}")
-    return vector if abs(size - 1.0) <= ROUNDED else vector / size
-
-
 @dataclass(frozen=True, eq=False)
 class Beam:
     """Collimated coherent beam: a plane wave, launched as a grid of parallel rays.
@@ -113,6 +103,17 @@ class Beam:
     polarisation: ComplexArray | None = None
     axes: PlaneAxes = field(init=False, repr=False)  # of columns, rows, and the direction
 
+    def __repr__(self) -> str:
+        (rows, columns), (width, height) = self.shape, self.size
+        return described(
+            self,
+            f"{columns} x {rows} rays, {length_text(width)} x {length_text(height)}",
+            f"centre {value_text(self.centre)} m, direction {value_text(self.axes[2])}",
+            "" if self.profile is None else f"profile {value_text(self.profile)}",
+            "" if self.polarisation is None else f"polarisation {value_text(self.polarisation)}",
+            f"passes {value_text(self.passes)}" if self.passes else "",
+        )
+
     def __post_init__(self) -> None:
         object.__setattr__(self, "centre", checked_vector(self.centre, "Beam centre"))
         object.__setattr__(self, "direction", checked_direction(self.direction, "Beam direction"))
@@ -124,7 +125,7 @@ class Beam:
             raise TypeError(f"Beam profile: expected None or a function of (x, y), got {self.profile!r}")
         object.__setattr__(self, "passes", as_names(self.passes))
         if self.polarisation is not None:
-            object.__setattr__(self, "polarisation", _checked_jones(self.polarisation))
+            object.__setattr__(self, "polarisation", checked_jones(self.polarisation, "Beam"))
 
     @property
     def area(self) -> float:

@@ -14,7 +14,7 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, filled, nm
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelength, filled, nm, short_repr
 
 # What the sum over a line may be off its integral, relative to the line.
 ERROR = 1e-6
@@ -42,6 +42,8 @@ class Spectrum:
 
     wavelengths: FloatArray
     weights: FloatArray
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         wavelengths, weights = (np.atleast_1d(filled(v).copy()) for v in (self.wavelengths, self.weights))
@@ -97,6 +99,8 @@ class Line:
 
     centre: float
     width: float
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         checked_wavelength(self.centre)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from fringetrace.core import checked_wavelength
+from fringetrace.core import checked_wavelength, short_repr
 from fringetrace.optics import Material
 from fringetrace.scene import CCD, Beam, Scene, Surface
 from fringetrace.scenefile.decode import decode
@@ -70,6 +70,8 @@ class Experiment:
     surface: tuple[Surface, ...] = ()
     beam: tuple[Beam, ...] = ()
     ccd: CCD | None = None
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         for wavelength in self.wavelengths:

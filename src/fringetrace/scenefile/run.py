@@ -14,8 +14,17 @@ from typing import Any
 import numpy as np
 
 from fringetrace.accuracy import checks, judge
-from fringetrace.core import Array, ComplexArray, FloatArray, FringetraceWarning, nm, staged, tables
-from fringetrace.field import chosen, complex_field, irradiance
+from fringetrace.core import (
+    Array,
+    ComplexArray,
+    FloatArray,
+    FringetraceWarning,
+    nm,
+    short_repr,
+    staged,
+    tables,
+)
+from fringetrace.field import choose, complex_field, irradiance
 from fringetrace.geometry import write_height_map
 from fringetrace.instruments import Interferometer, Mark, records, tiff
 from fringetrace.scene import CCD, Beam, Scene
@@ -38,6 +47,8 @@ class Run:
 
     experiment: Experiment
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+
+    __repr__ = short_repr
 
     def kept(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
         """Value computed once and kept."""
@@ -179,7 +190,9 @@ def _traced(current: Run, wavelength: float) -> Iterator[tuple[str, str]]:
         if paths.ccd is None:
             problems = checks.found(paths, wavelength)
         else:
-            costs, problems = judge(paths, wavelength, chosen(paths, current.method))
+            choice = choose(paths, current.method)
+            yield "method", str(choice)
+            costs, problems = judge(paths, wavelength, choice.method)
             yield "budget", f"{f'beam {number}' if len(every) > 1 else 'of the image'}: {costs.line}"
         paths.warned.update(problems)
         yield from (("note", note) for note in problems.values())

@@ -17,7 +17,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray
+from fringetrace.core import FloatArray, short_repr
 from fringetrace.geometry import Form, Mesh
 from fringetrace.instruments import Interferometer
 from fringetrace.optics import Element, Film, Material, PhasePlate, Retarder
@@ -253,6 +253,8 @@ class Recipe:
 
     name: str
     arguments: Mapping[str, Any]
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         known = kinds([Interferometer])

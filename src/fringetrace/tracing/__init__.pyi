@@ -3,6 +3,7 @@ from .checks import CUT as CUT, CUT_OFF as CUT_OFF, Losses as Losses
 from .detection import components as components, landed as landed, project as project
 from .fates import DETECTED as DETECTED, Fate as Fate
 from .intersect.bodies import Float32 as Float32, float32_hits as float32_hits
+from .intersect.exact import LEAF as LEAF, arrange as arrange
 from .optics_table import constants as constants, needs as needs, plain as plain, scene_media as scene_media
 from .paths import Ledger as Ledger, Paths as Paths, join as join
 from .ray_query import retrace as retrace

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from html import escape
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray
+from fringetrace.core import Array, ComplexArray, FloatArray, described, length_text, short_repr
 from fringetrace.scene import CCD, Beam, Scene, pixels
 from fringetrace.tracing.fates import Fate
 from fringetrace.tracing.rays import Rays
@@ -30,6 +31,17 @@ class Ledger:
     left: float
     absorbed: float
     truncated: float
+
+    __repr__ = short_repr
+
+    def _repr_html_(self) -> str:
+        total = self.incident or 1.0
+        rows = "".join(
+            f"<tr><th>{name}</th><td>{value:.6g}</td><td>{value / total:.4%}</td></tr>"
+            for name, value in vars(self).items()
+        )
+        head = "<tr><th>power</th><th></th><th>of the incident</th></tr>"
+        return f"<table>{head}{rows}</table>"
 
     @property
     def error(self) -> float:
@@ -151,6 +163,23 @@ class Paths:
     min_amplitude: float = 1e-6
     # what is worked out from the paths once, such as their wavefronts
     derived: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
+
+    def __repr__(self) -> str:
+        found = [(fate.name.lower(), int((self.fate == fate).sum())) for fate in Fate]
+        fates = ", ".join(f"{count:,} {name}" for name, count in found if count)
+        ends = self.detected if len(self.detected) else self
+        return described(
+            self,
+            f"{len(self):,} paths: {fates}" if len(self) else "no paths",
+            _range_text("{} to {} bounces", self.bounces, str),
+            _range_text("optical paths {} to {}", ends.length, length_text),
+            "" if self.wavelength is None else f"at {length_text(self.wavelength)}",
+            "recorded" if self.points is not None else "",
+            "polarised" if self.field is not None else "",
+        )
+
+    def _repr_html_(self) -> str:
+        return f"<div>{escape(repr(self))}</div>{self.ledger()._repr_html_()}"
 
     def __len__(self) -> int:
         return len(self.ray)
@@ -428,3 +457,8 @@ def join(parts: Iterable[Paths]) -> Paths:
         doubtful=sum(part.doubtful for part in parts),
         contradictions=_summed([part.contradictions for part in parts]),
     )
+
+
+def _range_text(text: str, values: Array, write: Callable[[Any], str]) -> str:
+    """Text with the least and the greatest of some values; nothing, if there are none."""
+    return text.format(write(values.min()), write(values.max())) if len(values) else ""

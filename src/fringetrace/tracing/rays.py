@@ -8,7 +8,7 @@ from numbers import Real
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, component, filled, unit
+from fringetrace.core import Array, ComplexArray, FloatArray, component, described, filled, unit, value_text
 from fringetrace.scene import Beam, as_names
 
 # A field may point along its ray by as much: rounding.
@@ -63,6 +63,15 @@ class Rays:
     area: float | None = None
     passes: tuple[str, ...] = ()
     polarisation: ComplexArray | None = None
+
+    def __repr__(self) -> str:
+        count, bare = f"{len(self):,} rays", self.area is None
+        return described(
+            self,
+            count if bare else f"{count} of {self.area:.6g} m^2 each",
+            "" if self.polarisation is None else "polarised",
+            f"passes {value_text(self.passes)}" if self.passes else "",
+        )
 
     def __post_init__(self) -> None:
         origin = _rows_of_three(self.origin, "Rays origin")
@@ -174,14 +183,14 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
     ValueError
         If the profile gives something other than one finite number a ray.
     """
-    from fringetrace.tracing import kernels_mirrors
+    from fringetrace.tracing import kernels_rays
 
     rows, columns = beam.shape
     start, stop, _ = slice(start, stop).indices(rows * columns)
     count = max(0, stop - start)
     u, v, n = beam.axes
     origin, direction = np.empty((count, 3)), np.empty((count, 3))
-    kernels_mirrors.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
+    kernels_rays.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
     amplitude = np.broadcast_to(np.complex128(1.0), (count,))  # read-only, and takes no room
     if beam.profile is not None:
         offset = origin - beam.centre

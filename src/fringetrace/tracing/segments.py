@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, dot, unit
+from fringetrace.core import Array, FloatArray, dot, short_repr, unit
 from fringetrace.geometry import Fit, LevelFit, Patches
 from fringetrace.scene import Surface
 from fringetrace.tracing.optics_table import constants
@@ -51,6 +51,8 @@ class Segments:
     index: FloatArray
     through: npt.NDArray[np.bool_]
     advance: FloatArray
+
+    __repr__ = short_repr
 
     @staticmethod
     def of(paths: Paths) -> Segments:
@@ -190,6 +192,8 @@ class SurfaceHits:
     hit: npt.NDArray[np.int64]
     point: FloatArray
     face: npt.NDArray[np.int64]
+
+    __repr__ = short_repr
 
     @property
     def formed(self) -> npt.NDArray[np.bool_]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fringetrace import instruments
-from fringetrace.core import ComplexArray, FloatArray, mm, nm, rotation, um, wavenumber
+from fringetrace.core import ComplexArray, FloatArray, mm, nm, rotation, short_repr, um, wavenumber
 from fringetrace.geometry import Mesh, forms, shapes
 from fringetrace.optics import Mirror
 from fringetrace.scene import CCD, Beam, Scene, Surface, pixel_centres
@@ -52,6 +52,8 @@ class Standard:
     beam: Beam
     ccd: CCD
     truth: Callable[[], Truth]
+
+    __repr__ = short_repr
 
     @property
     def curved(self) -> bool:

@@ -12,6 +12,7 @@ from fringetrace import instruments, mm, nm
 from fringetrace.core.vectors import rotation
 from fringetrace.field.wavefront import boundary_search, plane_waves, visibility
 from fringetrace.geometry import shapes
+from fringetrace.optics.gratings import Grating
 from fringetrace.scene import facet_groups
 from fringetrace.tracing.rays import launch, launch_at
 
@@ -133,3 +134,57 @@ def test_what_is_refused():
         ft.irradiance(replace(paths, ccd=None), HENE)
     with pytest.raises(ValueError, match="paths of a Beam, got those of Rays"):
         ft.irradiance(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE, "wavefront")
+
+
+def waves_of(surfaces, collapsed, order, ccd, polarisation=None):
+    """Plane waves of all ways of some bounces, as they are and with segments of no length."""
+    beam = ft.Beam((0, 0, 5 * mm), (0, 0, -1), (0, 1, 0), (1 * mm, 1 * mm), (3, 3), polarisation=polarisation)
+    paths = ft.trace(ft.Scene(surfaces, medium=1.0), beam, ccd, record=True, wavelength=HENE)
+    ways = np.flatnonzero((paths.bounces == order) & (paths.fate == ft.Fate.DETECTED) & (paths.ray == 4))
+    points = paths.points.copy()
+    for k in collapsed:
+        points[ways, k + 1] = points[ways, k]
+    starts = None if paths.departures is None else points[:, :-1].copy()
+    touching = replace(paths, points=points, departures=starts)
+    assert len(ways)
+    return [
+        [plane_waves._wave(some, row, np.uint64(1), np.zeros(2), beam, ccd) for some in (paths, touching)]
+        for row in ways
+    ]
+
+
+def alike(one, other):
+    assert other.matrix == pytest.approx(one.matrix, rel=ROUNDING)
+    assert other.gradient == pytest.approx(one.gradient, abs=ROUNDING * mm)
+    assert other.amplitude == pytest.approx(one.amplitude, rel=ROUNDING)
+
+
+BELOW = ft.CCD((0, 0, -5 * mm), (0, 0, 1), (0, 1, 0), 0.1 * mm, (8, 8))
+ABOVE = ft.CCD((0, 0, 8 * mm), (0, 0, -1), (0, 1, 0), 0.5 * mm, (8, 8))
+
+
+def plate(interface, z, name, **sides):
+    return ft.Surface(shapes.plate(4 * mm, 4 * mm).moved((0, 0, z)), interface, name, **sides)
+
+
+def test_segments_of_no_length_divide_nothing():
+    """Between faces at the same place light goes on as its branches say."""
+    glass = [plate(ft.Dielectric(), -z, f"{z}", front=n, back=m) for z, n, m in (
+        (0.0, 1.0, 1.5), (1e-6, 1.5, 1.7), (1e-3, 1.7, 1.0),
+    )]  # fmt: skip
+    tilted = [surface.moved(turn=rotation((1, 0, 0), 0.1)) for surface in glass]
+    for one, other in waves_of(tilted, [1], 3, BELOW):
+        alike(one, other)
+
+
+@pytest.mark.parametrize("polarisation", [None, (1.0, 0.5j)])
+def test_behind_an_element_the_direction_is_what_it_makes_of_the_light(polarisation):
+    grating = Grating((1, 0, 0), 20e-6, orders=(0, 1))
+    top, tiny = plate(grating, 0.0, "grating"), 1e-9
+    for below, order, ccd in (
+        (plate(ft.Mirror(), -tiny, "mirror"), 3, ABOVE),
+        (plate(ft.Dielectric(), -tiny, "glass", back=1.5), 2, BELOW),
+        (plate(grating, -tiny, "other grating"), 2, BELOW),
+    ):
+        for one, other in waves_of([top, below], range(1, order), order, ccd, polarisation):
+            alike(one, other)

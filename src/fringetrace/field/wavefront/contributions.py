@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray
+from fringetrace.core import ComplexArray, FloatArray, short_repr
 from fringetrace.field.sample_points import Samples
 from fringetrace.field.wavefront import plane_waves
 from fringetrace.field.wavefront.patches import PatchCells
@@ -36,6 +36,8 @@ class PlaneWave:
     wave: Wave
     region: Region
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class CurvedWave:
@@ -48,6 +50,8 @@ class CurvedWave:
     odd: bool
     unit: float
     cells: PatchCells
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +77,8 @@ class Contributions:
     begin: npt.NDArray[np.int64]
     base: FloatArray
     slope: FloatArray
+
+    __repr__ = short_repr
 
     @property
     def nbytes(self) -> int:

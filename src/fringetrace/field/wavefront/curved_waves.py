@@ -18,6 +18,7 @@ from fringetrace.field.wavefront.patches import (
     largest,
     leaved,
     patches,
+    positions,
     sheet,
 )
 from fringetrace.field.wavefront.probe import Probe, profile
@@ -39,7 +40,7 @@ LOST = 0.1
 STENCIL = 5
 
 
-def curved(survey: Survey) -> tuple[list[PatchCells], FloatArray]:
+def curved(survey: Survey) -> tuple[list[tuple[int, PatchCells]], FloatArray]:
     """Curved wavefronts off surfaces with a form, cut along their edges.
 
     Parameters
@@ -49,16 +50,18 @@ def curved(survey: Survey) -> tuple[list[PatchCells], FloatArray]:
 
     Returns
     -------
-    list of Cells
+    list of (number of the sequence, PatchCells)
+        Of those that reach the CCD.
     segments : (n, 4) float64, pixels
         Their edges, and the rim of the beam: x, y of either end.
     """
     probe = survey.probe
-    which = np.flatnonzero(survey.curved).tolist()
+    seen = {int(index): _squares(survey, int(index)) for index in np.flatnonzero(survey.curved)}
+    which = [index for index, squares in seen.items() if len(squares.cell)]
     if not which:
         return [], np.empty((0, 4))
+    cells = Squares.joined([seen[index].numbered(n) for n, index in enumerate(which)])
     grids = [_grid(survey, index) for index in which]
-    cells = Squares.joined([_squares(survey, index, grids[n], n) for n, index in enumerate(which)])
     names = survey.names[which]
     witnesses = survey.witnesses.numbered(which)
     pieces = cut(probe, names, cells, witnesses)
@@ -74,7 +77,7 @@ def curved(survey: Survey) -> tuple[list[PatchCells], FloatArray]:
         patched = PatchFit(
             mine, np.arange(len(row)), coefficients[n][row, column], turns, mine.low, mine.high
         )
-        found.append(_together([patched, *fit], grid.base, probe.ccd))
+        found.append((which[n], _together([patched, *fit], grid.base, probe.ccd)))
         drawn += [_drawn(part, probe) for part in (patched, *fit)]
     return found, np.concatenate(drawn)
 
@@ -95,10 +98,10 @@ def _around(values: FloatArray) -> FloatArray:
     return np.where(np.isfinite(corner), corner, near)
 
 
-def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> Squares:
+def _squares(survey: Survey, index: int) -> Squares:
     """Cells that a sheet may light, towards the CCD."""
     lit = survey.corners(index)
-    x, y = grid.x, grid.y
+    y, x = np.moveaxis(positions(survey.paths, survey.rows[index], survey.probe.ccd, survey.shape), -1, 0)
     steps = [np.hypot(differences(x, axis), differences(y, axis)) for axis in (0, 1)]
     scale = np.maximum(*(_around(step) for step in steps))
     # light that goes past the CCD's plane is spread without bounds
@@ -117,7 +120,7 @@ def _squares(survey: Survey, index: int, grid: Sheet, number: int) -> Squares:
     row, column = row[near], column[near]
     low = np.stack([column, row], axis=1).astype(np.float64)
     cell = row * lit.shape[1] + column
-    return Squares(np.full(len(row), number), cell, scale[row, column], low, lit[row, column], 1.0)
+    return Squares(np.zeros(len(row), dtype=np.int64), cell, scale[row, column], low, lit[row, column], 1.0)
 
 
 def _complete(lit: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:

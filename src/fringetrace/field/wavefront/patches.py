@@ -108,6 +108,20 @@ def sheets(paths: Paths) -> Iterator[Sheet]:
         yield sheet(paths, rows[keys == key], ccd, beam.shape)
 
 
+def on_grid(values: Array, node: Array, shape: tuple[int, int]) -> Array:
+    """Values (n, ...) of nodes on their grid (rows, columns, ...); NaN, or 0 of whole numbers, elsewhere."""
+    fill = np.nan if values.dtype.kind in "fc" else 0
+    blank = np.full((shape[0] * shape[1], *values.shape[1:]), fill, dtype=values.dtype)
+    blank[node] = values
+    return blank.reshape(*shape, *values.shape[1:])
+
+
+def positions(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> FloatArray:
+    """Where some paths cross the CCD's plane of focus, (rows, columns, 2) pixels on a grid: y, x."""
+    chosen = paths.where(rows)
+    return on_grid(pixels(ccd, landed(chosen, ccd)[1]), chosen.ray, shape)
+
+
 def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
     """Arrivals of one surface sequence on a grid.
 
@@ -128,10 +142,7 @@ def sheet(paths: Paths, rows: Array, ccd: CCD, shape: tuple[int, int]) -> Sheet:
     arrived = arrivals(paths, rows, ccd)
 
     def grid(values: Array) -> Array:
-        fill = np.nan if values.dtype.kind in "fc" else 0
-        blank = np.full((shape[0] * shape[1], *values.shape[1:]), fill, dtype=values.dtype)
-        blank[paths.ray[rows]] = values
-        return blank.reshape(*shape, *values.shape[1:])
+        return on_grid(values, chosen.ray, shape)
 
     base = float(arrived.length.mean()) if len(rows) else 0.0
     turns = np.zeros(shape, dtype=np.int64)

@@ -14,7 +14,7 @@ from fringetrace.field.wavefront.boundary_search import cut
 from fringetrace.field.wavefront.probe import RIM, profile
 from fringetrace.field.wavefront.quadtree import CORNERS, Pieces, Squares
 from fringetrace.field.wavefront.visibility import Survey
-from fringetrace.optics import refract
+from fringetrace.optics import IncidentRays, refract
 from fringetrace.scene import CCD, Beam, Surface, pixels
 from fringetrace.tracing import Paths, Segments, components, landed
 
@@ -79,6 +79,24 @@ def _met(paths: Paths, row: int) -> list[tuple[Surface, FloatArray]]:
     return list(zip(surfaces, normals, strict=True))
 
 
+def _sent(paths: Paths, row: int, bounce: int, direction: FloatArray, normal: FloatArray) -> FloatArray:
+    """Direction (3,) in which a thin element sends light, where the next surface is at the same place."""
+    assert paths.surface is not None
+    assert paths.branch is not None
+    assert paths.points is not None
+    element = paths.scene.surfaces[paths.surface[row, bounce]].element
+    assert element is not None
+    across = unit(np.cross(direction, np.eye(3)[[np.argmin(np.abs(direction))]]))
+    rays = IncidentRays(
+        point=paths.points[row, [bounce + 1]], direction=direction[None], normal=normal[None],
+        index=Segments.of(paths.where(np.array([row]))).index[0, [bounce]],
+        field=(np.ones(1) if paths.field is None else across).astype(np.complex128),
+        wavelength=paths.wavelength,
+    )  # fmt: skip
+    sent = element.act(rays)[paths.branch[row, bounce] - 1].direction
+    return direction if sent is None else np.asarray(sent[0], dtype=np.float64)
+
+
 def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam, ccd: CCD) -> Wave:
     """The plane wave that a ray belongs to: what its bounces make of a step across the beam."""
     assert paths.points is not None
@@ -86,18 +104,19 @@ def _wave(paths: Paths, row: int, name: np.uint64, start: FloatArray, beam: Beam
     assert paths.branch is not None
     u, v, direction = beam.axes
     across = np.stack([u * beam.size[0] / beam.shape[1], v * beam.size[1] / beam.shape[0]], axis=1)
-    count = paths.bounces[row]
-    legs = paths.points[row, 2 : count + 1] - paths.starts[row, 1:count]
-    onward = np.concatenate([legs, paths.direction[row, None]])
+    count, met = paths.bounces[row], _met(paths, row)
     index = Segments.of(paths.where(np.array([row]))).index[0]
-    for k, (surface, normal) in enumerate(_met(paths, row)):
+    onward = paths.points[row, 2 : count + 2] - paths.starts[row, 1 : count + 1]
+    onward[count - 1 :] = paths.direction[row]
+    for k, (surface, normal) in enumerate(met):
         if paths.branch[row, k] == 0:
             across = across - 2.0 * np.outer(normal, normal @ across)
             direction = direction - 2.0 * (direction @ normal) * normal
             continue
         bent = refract(direction, normal, index[k], index[k + 1])
         if surface.element is not None:
-            bent = onward[k] / np.linalg.norm(onward[k])
+            way = np.linalg.norm(onward[k])
+            bent = onward[k] / way if way > 0.0 else _sent(paths, row, k, direction, normal)
         if bent is not direction:
             # the step along the surface is the same on both sides
             across = across - np.outer(direction, (normal @ across) / (normal @ direction))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -120,6 +120,10 @@ class Squares:
         """Which squares of a wave touch a chosen one, (n,) bool."""
         steps = np.array([i * STRIDE + j for i in (-1, 0, 1) for j in (-1, 0, 1)])
         return np.isin(self.numbers, (self.numbers[chosen][:, None] + steps).ravel())
+
+    def numbered(self, wave: int) -> Squares:
+        """All of them, of a wave."""
+        return replace(self, wave=np.full(len(self.cell), wave))
 
     def part(self, rows: Array) -> Squares:
         """Subset of the squares."""

@@ -21,6 +21,9 @@ CELL, S0, S1, T0, T1, SIGN, LEFT, RIGHT, LOW, HIGH, A, B, C = range(13)
 REGULAR = 0.35
 # A regular leaf reaches this part of its width beyond its probes at most, a fold a few times that.
 MARGIN = 0.03
+# The remainder of a path in wavelengths is exact by a product of halves of float64's digits for fewer than
+# MANY of them: 2^26 and 2^27 + 1.
+MANY, SPLITTER = 67108864.0, 134217729.0
 # A cell is halved this often at most.
 DEPTH = 6
 # Cells own their sides shifted by this part of a cell: a sample exactly on a side has one owner.
@@ -229,11 +232,19 @@ def add_waves(rows, begin, component, period, group, factor, field):
     Those of wave w are rows begin[w] to begin[w + 1]; they are multiplied by factor[w].
     """
     c = 2 + 2 * component
+    # the wavelength in two parts (T. J. Dekker, Numer. Math. 18 (1971) 224): n times the longer is exact
+    long = period * SPLITTER
+    long -= long - period
+    short = period - long
     for wave in range(len(begin) - 1):
         light, there = factor[wave], field[group[wave]]
-        for row in rows[begin[wave] : begin[wave + 1]]:
-            turn = 2.0 * np.pi * ((row[1] % period) / period)
-            there[int(row[0])] += light * complex(row[c], row[c + 1]) * complex(np.cos(turn), np.sin(turn))
+        for row in range(begin[wave], begin[wave + 1]):
+            way = rows[row, 1]
+            number = np.rint(way / period)
+            rest = (way - number * long) - number * short if abs(number) < MANY else way % period
+            turn = 2.0 * np.pi * (rest / period)
+            wave_here = complex(rows[row, c], rows[row, c + 1]) * complex(np.cos(turn), np.sin(turn))
+            there[int(rows[row, 0])] += light * wave_here
 
 
 @part

@@ -49,10 +49,15 @@ def differences(values: FloatArray, axis: int) -> FloatArray:
         low, high = -begin, count - (begin + len(weights) - 1)
         if low >= high:
             continue
-        estimate = sum(w * f[low + begin + i : high + begin + i] for i, w in enumerate(weights))
-        # 0 * NaN is NaN: a stencil with a hole in it gives none
+        # only the rows that no stencil before has filled
         open_ = np.isnan(result[low:high])
-        result[low:high] = np.where(open_, estimate, result[low:high])
+        rows = low + np.flatnonzero(open_.reshape(high - low, -1).any(axis=1))
+        if len(rows) == 0:
+            continue
+        first, last = int(rows[0]), int(rows[-1]) + 1
+        # 0 * NaN is NaN: a stencil with a hole in it gives none
+        estimate = sum(w * f[first + begin + i : last + begin + i] for i, w in enumerate(weights))
+        result[first:last] = np.where(open_[first - low : last - low], estimate, result[first:last])
     return np.asarray(np.moveaxis(result, 0, axis), dtype=np.float64)
 
 

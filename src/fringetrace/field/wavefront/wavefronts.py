@@ -314,9 +314,8 @@ def _reconstructed(paths: Paths) -> Wavefronts:
     plane = [
         PlaneWave(*about[wave.name], beam, wave, region) for wave, region in plane_waves.plane_waves_of(seen)
     ]
-    cells, rim = curved_waves.curved(seen)
-    named = seen.names[seen.curved]
-    sheets = [CurvedWave(*about[name], unit, one) for name, one in zip(named, cells, strict=True)]
+    curved_seen, rim = curved_waves.curved(seen)
+    sheets = [CurvedWave(*about[seen.names[index]], unit, cells) for index, cells in curved_seen]
     drawn = [one.wave.to_pixels(one.region.segments).reshape(-1, 4) for one in plane]
     segments = np.concatenate([rim, *drawn])
     return Wavefronts(ccd, tuple(plane), tuple(sheets), segments, len(paths), components, None)

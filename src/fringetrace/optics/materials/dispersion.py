@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fringetrace.core import FloatArray
+from fringetrace.core import FloatArray, short_repr
 
 Coefficients = tuple[float, ...]
 
@@ -120,6 +120,8 @@ class IndexFormula:
     coefficients: Coefficients
     range: tuple[float, float] | None = None
 
+    __repr__ = short_repr
+
     def __post_init__(self) -> None:
         if self.form not in FORMS:
             raise ValueError(f"dispersion: expected one of {', '.join(FORMS)}, got {self.form!r}")
@@ -156,6 +158,8 @@ class IndexTable:
 
     wavelength: tuple[float, ...]
     value: tuple[float, ...]
+
+    __repr__ = short_repr
 
     def __post_init__(self) -> None:
         w, v = np.array(self.wavelength), np.array(self.value)

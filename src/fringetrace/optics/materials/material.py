@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, nm, um
+from fringetrace.core import ComplexArray, described, nm, um, value_text
 from fringetrace.optics.materials.dispersion import Curve, IndexFormula, IndexTable
 
 # Wavelengths in metres are rounded: the ends of a range belong to it.
@@ -43,6 +43,11 @@ class Material:
     n: Curve
     kappa: Curve | None = None
     source: str = field(default="", compare=False)
+
+    def __repr__(self) -> str:
+        index = getattr(self.n, "form", "tabulated") if self.dispersive else value_text(self.index(1.0))
+        reach = "" if self.range is None else f"{self.range[0] / um:.4g} to {self.range[1] / um:.4g} um"
+        return described(self, value_text(self.name), index, reach, "" if self.kappa is None else "absorbs")
 
     def __post_init__(self) -> None:
         if self.range is not None and self.range[0] > self.range[1]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, unit_of
+from fringetrace.core import FloatArray, short_repr, unit_of
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.tracing import Paths
 from fringetrace.views.scene3d.palette import SHADES, look
@@ -47,6 +47,8 @@ class Solid:
     opacity: float
     relief: bool
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Panel:
@@ -64,6 +66,8 @@ class Panel:
     corners: FloatArray
     image: FloatArray | None = None
 
+    __repr__ = short_repr
+
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
@@ -76,6 +80,8 @@ class Arrow:
 
     tail: FloatArray
     tip: FloatArray
+
+    __repr__ = short_repr
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,6 +112,8 @@ class Stage:
     legend: tuple[tuple[str, str], ...]
     bar: FloatArray
     bar_label: str
+
+    __repr__ = short_repr
 
     @property
     def places(self) -> list[tuple[str, FloatArray]]:

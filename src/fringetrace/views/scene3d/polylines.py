@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, checked_wavelength, path_phase
+from fringetrace.core import Array, FloatArray, checked_wavelength, path_phase, short_repr
 from fringetrace.instruments import Mark
 from fringetrace.scene import CCD, Beam
 from fringetrace.tracing import Fate, Paths, Segments, at_wavelength, surface_phase
@@ -81,6 +81,8 @@ class Strands:
     routes: tuple[str, ...]
     rays: int
     focused: bool = False
+
+    __repr__ = short_repr
 
     def __len__(self) -> int:
         return len(self.ray)

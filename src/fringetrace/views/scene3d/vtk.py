@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fringetrace.core import FloatArray, nm, unit_of
+from fringetrace.core import FloatArray, nm, short_repr, unit_of
 from fringetrace.views.scene3d.layout import (
     AZIMUTH,
     ELEVATION,
@@ -77,6 +77,8 @@ class View:
     radius: float = 0.0
     clip: tuple[FloatArray, FloatArray] | None = None
     frames: FloatArray | None = None
+
+    __repr__ = short_repr
 
 
 def path_lines(view: View) -> PolyData:
