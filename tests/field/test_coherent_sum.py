@@ -170,6 +170,7 @@ def test_light_that_does_not_reach_the_ccd_leaves_no_trace():
 # The method by itself
 
 
+@pytest.mark.filterwarnings("ignore:media contradict")
 def test_the_method_is_chosen_by_what_it_can_do_and_what_it_costs():
     paths = ft.trace(EMPTY, scattered(2), ccd())
     assert choose(paths).method == "rays"

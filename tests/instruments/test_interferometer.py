@@ -71,6 +71,7 @@ def test_fringes_lose_their_visibility_over_a_pixel(bench):
     np.testing.assert_allclose(modulation, 2 * abs(mutual[inner][0, 1]), rtol=QUADRATURE)
 
 
+@pytest.mark.filterwarnings("ignore:fringes alias")
 def test_fields_are_kept_for_the_last_wavelength(bench):
     first = bench.fields(HENE)
     assert bench.fields(HENE) is first

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray
+from fringetrace.core import Array, FloatArray, short_repr
 from fringetrace.geometry import IndexArray, Mesh, weld
 from fringetrace.scene.model import Scene
 
@@ -40,6 +40,8 @@ class Opening:
     edges: IndexArray
     area: float
     centre: FloatArray
+
+    __repr__ = short_repr
 
 
 def openings(scene: Scene) -> tuple[Opening, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, warn_once
+from fringetrace.core import Array, FloatArray, short_repr, warn_once
 from fringetrace.scene import Scene, openings
 from fringetrace.tracing.fates import Fate
 from fringetrace.tracing.paths import Paths
@@ -54,6 +54,8 @@ class Losses:
     contradictions: npt.NDArray[np.int64]
     max_bounces: int
     min_amplitude: float
+
+    __repr__ = short_repr
 
     @staticmethod
     def of(paths: Paths) -> Losses:
