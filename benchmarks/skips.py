@@ -286,7 +286,7 @@ def differences(side: int) -> Skip:
     bench = ft.instruments.michelson(
         flat.moved(turn=turn), aperture=6 * mm, pixels=(pixels, pixels), reference_tilt=(tilt, 0.0)
     )
-    paths = ft.trace(bench.scene, replace(bench.beam, shape=(12, 12)), bench.ccd)
+    paths = ft.trace(bench.scene, replace(bench.beam, shape=(12, 12)), bench.ccd, warn=False)
 
     def image() -> list[np.ndarray]:
         return [ft.irradiance(paths, WAVE, "wavefront")]

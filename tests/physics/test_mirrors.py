@@ -50,6 +50,7 @@ def test_a_corner_cube(turn, subdivisions):
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.1, 2.0])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_thousand_bounces_between_parallel_plates(slope):
     gap, count = 0.25, 1000
     low, high = shapes.plate(1200.0, 2.0), shapes.plate(1200.0, 2.0).moved((0, 0, gap))
@@ -133,6 +134,7 @@ def test_a_wedge_of_two_mirrors(angle, parts):
 # Mirrors parallel to an axis leave the part of a direction along it as it is.
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_box_keeps_the_parts_of_a_direction():
     rng = np.random.default_rng(3)
     rays = ft.Rays(rng.uniform(-0.4, 0.4, (50, 3)), rng.normal(size=(50, 3)))
@@ -147,6 +149,7 @@ def test_a_box_keeps_the_parts_of_a_direction():
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_light_goes_the_same_way_back(seed):
     rng = np.random.default_rng(seed)
     x = np.linspace(-1.0, 1.0, 21)
@@ -168,6 +171,7 @@ def test_light_goes_the_same_way_back(seed):
 
 
 @pytest.mark.parametrize("sides", [18, 60, 400])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_polygon_for_a_circle_seen_from_its_centre(sides):
     # there and back: 2 (cos(pi/n) / cos(angle from the middle of a side) - 1); from 0 to -h^2/4, mean -h^2/6
     polygon = shapes.rod_lattice(1, 1, 1.0, 3.0, 2.0, sides=sides)
