@@ -213,7 +213,7 @@ def dropped(side: int) -> Skip:
             if not (batch.bounces[:rows] == 0).all():
                 finished = first[0] - rows
                 if finished:
-                    idle = part(first[1], 0, finished)
+                    idle = part(first[1], slice(0, finished))
                     find(engine, idle, finished, type(hits).blank(finished), passed)
             else:
                 kept = {name: column[:rows].copy() for name, column in batch._asdict().items()}
