@@ -20,7 +20,7 @@ from fringetrace.scene import CCD, Beam, Scene, screen
 from fringetrace.tracing.batch import Ends, Light, blank, part
 from fringetrace.tracing.loop import Chunk, advance
 from fringetrace.tracing.paths import Paths, join
-from fringetrace.tracing.plan import TraceLimits, Plan
+from fringetrace.tracing.plan import Plan, TraceLimits
 from fringetrace.tracing.rays import Rays
 from fringetrace.tracing.record import tables
 from fringetrace.tracing.workspace import Workspace
