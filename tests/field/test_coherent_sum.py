@@ -189,7 +189,13 @@ def test_the_method_is_chosen_by_what_it_can_do_and_what_it_costs():
     long = choice(ball, shape=(800, 800), **glass)
     assert long.method == "rays"
     assert str(long) == "rays: wavefronts off 1,280 flat facets take 819 s; about 1 s"
-    assert long.seconds < LONGEST
+    assert LONGEST < 1280 * 800 * 800 * 1e-6
+
+
+def test_unknown_methods_are_refused():
+    paths = ft.trace(EMPTY, scattered(2), ccd())
+    with pytest.raises(ValueError, match=r"method: expected one of .*, got 'waves'"):
+        choose(paths, "waves")
 
 
 # Groups

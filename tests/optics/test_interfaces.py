@@ -140,3 +140,34 @@ def test_reflect_at_normal_incidence_and_in_passing():
     z, x = np.array([[0.0, 0.0, 1.0]]), np.array([[1.0, 0.0, 0.0]])
     np.testing.assert_array_equal(interfaces.reflect(z, z), -z)
     np.testing.assert_array_equal(interfaces.reflect(x, z), x)
+
+
+KINDS = {
+    "constant": [ft.Mirror(), ft.optics.Absorber(), ft.BeamSplitter()],
+    "boundary": [ft.Dielectric(), ft.Metal(), ft.Dielectric(film=ft.optics.Film([(1.4, 1e-7)]))],
+    "element": [
+        ft.optics.elements.Annulus((0, 0, 0), 0.0, 1.0),
+        ft.optics.elements.IdealLens((0, 0, 0), (0, 0, 1), 0.1),
+        ft.optics.Polariser((1, 0, 0)),
+    ],
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_interfaces_answer_the_same_questions(kind):
+    for interface in KINDS[kind]:
+        assert interface.kind == kind
+        assert interface.branches >= 1
+        assert interface.polarised in (True, False)
+        assert interface.chromatic == (getattr(interface, "film", None) is not None)
+        assert interface.waves in ("plane", "curved", "torn")
+
+
+def test_interfaces_of_your_own_need_but_two_amplitudes():
+    class Half(ft.optics.ConstantInterface):
+        reflection = -0.6 + 0j
+        transmission = 0.8j
+
+    surface = ft.Surface(ft.shapes.plate(1.0, 1.0), Half())
+    paths = ft.trace(ft.Scene([surface]), ft.Rays([(0, 0, 1)], [(0, 0, -1)]))
+    assert sorted(abs(paths.amplitude)) == pytest.approx([0.6, 0.8])

@@ -94,8 +94,7 @@ def test_power_adds_up_and_both_beams_meet():
     instrument = bench(delay(1.0))
     paths = instrument.trace()
     assert paths.ledger().error < 1e-12
-    assert instrument.mark is not None
-    assert np.bincount(instrument.mark.count(paths.detected)).tolist() == [12, 12]
+    assert np.bincount(instrument.arms.reference.count(paths.detected)).tolist() == [12, 12]
 
 
 def test_recorded_light_goes_straight_on_from_where_the_plates_displace_it():

@@ -570,7 +570,7 @@ def test_numpy_numbers_are_numbers():
 
 
 def test_no_kind_of_integer_compiles_the_loops_again():
-    from fringetrace.tracing import kernels_mirrors
+    from fringetrace.tracing import kernels_loop
 
     scene, rays = ft.Scene([surface(), surface(z=1.0)]), one()
     box = ft.Scene([ft.Surface(shapes.plate(1.0, 1.0, 1.0), ft.Mirror())])
@@ -579,7 +579,7 @@ def test_no_kind_of_integer_compiles_the_loops_again():
     def compiled(most):
         for where, what in ((scene, rays), (box, inside)):
             assert ft.trace(where, what, max_bounces=most).bounces.tolist() == [3]
-        return len(kernels_mirrors.interact.signatures), len(kernels_mirrors.rebound.signatures)
+        return len(kernels_loop.interact.signatures), len(kernels_loop.rebound.signatures)
 
     before = compiled(3)
     for kind in (np.int32, np.uint8, np.int64):

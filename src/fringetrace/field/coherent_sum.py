@@ -129,7 +129,7 @@ def torn(paths: Paths) -> str | None:
     str or None
     """
     surfaces = paths.scene.surfaces
-    return next((s.name for s in surfaces if getattr(s.interface, "waves", None) == "torn"), None)
+    return next((s.name for s in surfaces if s.interface.waves == "torn"), None)
 
 
 def complex_field(

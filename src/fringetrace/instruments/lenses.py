@@ -276,7 +276,7 @@ def _surface(
     mesh: Mesh, interface: Boundary, name: str, form: Form | None, front: Glass, back: Glass
 ) -> Surface:
     """A surface, with its media where it parts any."""
-    if isinstance(interface, (Dielectric, Metal)):
+    if interface.kind == "boundary":
         media = [None if medium is None else as_material(medium, f"{name} glass") for medium in (front, back)]
         return Surface(mesh, interface, name, form, *media)
     return Surface(mesh, interface, name, form)

@@ -13,6 +13,7 @@ from .elements import (
     Branch as Branch,
     Element as Element,
     IncidentRays as IncidentRays,
+    InterfaceKind as InterfaceKind,
     RealIndex as RealIndex,
 )
 from .film_kernels import (
@@ -26,6 +27,7 @@ from .films import Film as Film, coefficients as coefficients
 from .interfaces import (
     Absorber as Absorber,
     BeamSplitter as BeamSplitter,
+    ConstantInterface as ConstantInterface,
     Dielectric as Dielectric,
     Interface as Interface,
     Metal as Metal,

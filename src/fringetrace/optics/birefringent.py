@@ -26,6 +26,7 @@ from fringetrace.core import (
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     RealIndex,
     Waves,
     checked_index,
@@ -118,6 +119,7 @@ class ShearPlate:
     ordinary: RealIndex
     extraordinary: RealIndex
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True
@@ -236,6 +238,7 @@ class Wollaston:
     extraordinary: RealIndex
     thickness: float = 0.0
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 2
     polarised: ClassVar[bool] = True

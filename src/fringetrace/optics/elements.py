@@ -30,6 +30,7 @@ from fringetrace.core import (
 PARALLEL = 8.0 * float(np.finfo(np.float64).eps)
 
 RealIndex = float | Callable[[float], float]
+InterfaceKind = Literal["constant", "boundary", "element"]
 Waves = Literal["plane", "curved", "torn"]
 
 
@@ -92,6 +93,10 @@ class Element(Protocol):
     `polarised`: it asks for vector fields. `chromatic`: it asks for the wavelength. `waves`: plane waves
     leave it plane, curved, or torn (neighbouring rays may fare differently).
     """
+
+    @property
+    def kind(self) -> InterfaceKind:
+        """What a surface asks of it: "element"."""
 
     @property
     def waves(self) -> Waves:
@@ -287,6 +292,7 @@ class Annulus:
     inner: float
     outer: float
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "torn"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False
@@ -346,6 +352,7 @@ class IdealLens:
     focal_length: float
     object_distance: float = np.inf
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "curved"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False

@@ -20,6 +20,7 @@ from fringetrace.core import FloatArray, checked_direction, checked_vector, dot,
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     Waves,
     deflect,
     move_point,
@@ -95,6 +96,7 @@ class Grating:
     centre: FloatArray | tuple[float, float, float] = (0.0, 0.0, 0.0)
     reflects: bool = False
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     polarised: ClassVar[bool] = False
     chromatic: ClassVar[bool] = True

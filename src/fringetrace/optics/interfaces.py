@@ -6,11 +6,12 @@ import cmath
 import math
 from dataclasses import dataclass
 from numbers import Complex, Real
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 
 from fringetrace.core import FloatArray, short_repr
+from fringetrace.optics.elements import InterfaceKind, Waves
 
 if TYPE_CHECKING:
     from fringetrace.optics.films import Film
@@ -20,7 +21,11 @@ PASSIVE = 1.0 + 1e-12
 
 
 class Interface(Protocol):
-    """Protocol of interfaces with a constant amplitude for each of the two branches."""
+    """Anything with a constant amplitude for each of two branches.
+
+    What it is, and what else asks for it (`kind` to `waves`), has the same names on boundaries of media
+    and on an `Element`; `ConstantInterface` has them for what is as simple as a mirror.
+    """
 
     @property
     def reflection(self) -> complex:
@@ -28,7 +33,52 @@ class Interface(Protocol):
 
     @property
     def transmission(self) -> complex:
-        """Amplitude of the transmitted branch, relative to the incident one."""
+        """Amplitude of the branch that goes straight on."""
+
+    @property
+    def kind(self) -> InterfaceKind:
+        """What a surface asks of it: "constant" amplitudes."""
+
+    @property
+    def branches(self) -> int:
+        """How many branches there are, always."""
+
+    @property
+    def polarised(self) -> bool:
+        """Whether fields have to be vectors."""
+
+    @property
+    def chromatic(self) -> bool:
+        """Whether it depends on the wavelength."""
+
+    @property
+    def waves(self) -> Waves:
+        """How plane waves leave it: plane, curved or torn."""
+
+
+class ConstantInterface:
+    """Two branches of constant amplitudes, which keep plane waves plane, in any light."""
+
+    kind: ClassVar[InterfaceKind] = "constant"
+    branches: ClassVar[int] = 2
+    polarised: ClassVar[bool] = False
+    chromatic: ClassVar[bool] = False
+    waves: ClassVar[Waves] = "plane"
+
+
+class _MediaBoundary:
+    """What boundaries of media have in common."""
+
+    kind: ClassVar[InterfaceKind] = "boundary"
+    branches: ClassVar[int] = 2
+    polarised: ClassVar[bool] = False
+    waves: ClassVar[Waves] = "plane"
+    film: Film | None
+
+    @property
+    def chromatic(self) -> bool:
+        """Whether it depends on the wavelength, whatever its media do."""
+        return self.film is not None
 
 
 def _checked_fraction(value: float, what: str) -> float:
@@ -38,7 +88,7 @@ def _checked_fraction(value: float, what: str) -> float:
 
 
 @dataclass(frozen=True)
-class Mirror:
+class Mirror(ConstantInterface):
     """Ideal mirror: multiplies the field by -sqrt(reflectance), on both sides.
 
     The sign is the half-wave loss at a denser medium. What is not reflected is absorbed.
@@ -73,7 +123,7 @@ class Mirror:
 
 
 @dataclass(frozen=True)
-class Absorber:
+class Absorber(ConstantInterface):
     """Absorber: ends every ray."""
 
     @property
@@ -88,7 +138,7 @@ class Absorber:
 
 
 @dataclass(frozen=True)
-class BeamSplitter:
+class BeamSplitter(ConstantInterface):
     """Thin beam splitter, the same from both sides.
 
     A symmetric lossless splitter conserves energy at every phase between its two inputs only
@@ -138,7 +188,7 @@ def _checked_film(film: Film | None, what: str) -> None:
 
 
 @dataclass(frozen=True)
-class Dielectric:
+class Dielectric(_MediaBoundary):
     """Dielectric boundary between two media: refraction and reflection by Snell and Fresnel.
 
     A beam without polarisation takes the amplitudes of s light (E along the boundary).
@@ -161,6 +211,8 @@ class Dielectric:
     follow: str = "both"
     film: Film | None = None
 
+    opaque: ClassVar[bool] = False
+
     __repr__ = short_repr
 
     def __post_init__(self) -> None:
@@ -170,7 +222,7 @@ class Dielectric:
 
 
 @dataclass(frozen=True)
-class Metal:
+class Metal(_MediaBoundary):
     """Metal boundary: only the reflected branch is traced, the medium behind absorbs the rest.
 
     Parameters
@@ -185,6 +237,9 @@ class Metal:
     """
 
     film: Film | None = None
+
+    follow: ClassVar[str] = "reflected"
+    opaque: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         _checked_film(self.film, "Metal")

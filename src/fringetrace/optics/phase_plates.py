@@ -27,6 +27,7 @@ from fringetrace.core import (
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     Waves,
     checked_number,
     move_point,
@@ -163,6 +164,7 @@ class PhasePlate:
     reflects: bool = False
     relief: FormulaRelief | PixelRelief | SplineRelief = field(init=False, repr=False)
 
+    kind: ClassVar[InterfaceKind] = "element"
     polarised: ClassVar[bool] = False
 
     __repr__ = short_repr

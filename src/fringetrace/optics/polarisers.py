@@ -18,6 +18,7 @@ from fringetrace.core import ComplexArray, FloatArray, checked_direction, dot, f
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     RealIndex,
     Waves,
     checked_index,
@@ -55,6 +56,7 @@ class Polariser:
     axis: FloatArray
     extinction: float = 0.0
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
@@ -101,6 +103,7 @@ class Retarder:
     retardance: float | Callable[[float], float]
     design: float | None = None
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True
@@ -228,6 +231,7 @@ class JonesPlate:
     matrix: ComplexArray
     axis: FloatArray
 
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = True

@@ -12,6 +12,7 @@ from fringetrace.core import FloatArray, checked_direction, dot, short_repr
 from fringetrace.optics.elements import (
     Branch,
     IncidentRays,
+    InterfaceKind,
     Waves,
     checked_number,
     rotate_vector,
@@ -41,6 +42,7 @@ class Pupil:
     aperture: float
 
     # a plane wave has one direction: all of it passes, or none
+    kind: ClassVar[InterfaceKind] = "element"
     waves: ClassVar[Waves] = "plane"
     branches: ClassVar[int] = 1
     polarised: ClassVar[bool] = False

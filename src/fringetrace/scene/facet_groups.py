@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
 from fringetrace.geometry import weld
-from fringetrace.optics import Metal
 from fringetrace.scene.coplanar import planes
 from fringetrace.scene.model import Scene, Surface
 
@@ -37,7 +36,7 @@ def _even(surface: Surface, scene: Scene) -> bool:
     """Whether light beside a surface keeps its power on the way; in a metal there is none."""
     sides = (surface.front or scene.around, surface.back or scene.around)
     absorbs = [medium.kappa is not None for medium in sides]
-    return not (all(absorbs) if isinstance(surface.interface, Metal) else any(absorbs))
+    return not (all(absorbs) if surface.opaque else any(absorbs))
 
 
 def _bent(parts: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
@@ -51,7 +50,7 @@ def _parts(surface: Surface) -> npt.NDArray[np.int64]:
     flat = np.ones(len(mesh.faces), dtype=np.bool_)
     if surface.form is not None:
         flat = surface.form.fit(mesh.vertices, mesh.faces).along == 0
-    elif getattr(surface.interface, "waves", "plane") != "plane":
+    elif surface.interface.waves != "plane":
         flat[:] = False
     parts[~flat] = -1 - _hanging_together(mesh.vertices, mesh.faces[~flat])
     parts[flat] = planes(mesh.vertices[mesh.faces[flat]])

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy.typing as npt
 
 from fringetrace.core import described, value_text
 from fringetrace.geometry import Mesh, as_mesh
-from fringetrace.optics import Dielectric, Interface, Metal
+from fringetrace.optics import Dielectric, Interface, InterfaceKind, Metal
 
 if TYPE_CHECKING:
     from fringetrace.geometry import Form
-    from fringetrace.optics import Element, Material
+    from fringetrace.optics import Element, Film, Material
 
 
 def _medium(value: Any, what: str) -> Material | None:
@@ -69,9 +69,9 @@ class Surface:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "mesh", as_mesh(self.mesh, self.name))
-        constant = all(hasattr(self.interface, name) for name in ("reflection", "transmission"))
-        known = constant or isinstance(self.interface, (Dielectric, Metal)) or hasattr(self.interface, "act")
-        if isinstance(self.interface, type) or not known:
+        if isinstance(self.interface, type) or getattr(self.interface, "kind", None) not in get_args(
+            InterfaceKind
+        ):
             raise TypeError(f"{self.name} interface: expected one such as Mirror(), got {self.interface!r}")
         self._check_media()
         if self.form is not None:
@@ -82,12 +82,22 @@ class Surface:
     @property
     def boundary(self) -> bool:
         """Whether the surface separates two media."""
-        return isinstance(self.interface, (Dielectric, Metal))
+        return self.interface.kind == "boundary"
 
     @property
     def element(self) -> Element | None:
         """Thin element of the surface, or None."""
-        return cast("Element", self.interface) if hasattr(self.interface, "act") else None
+        return cast("Element", self.interface) if self.interface.kind == "element" else None
+
+    @property
+    def opaque(self) -> bool:
+        """Whether it is a boundary that absorbs all that gets through it."""
+        return self.boundary and cast("Dielectric | Metal", self.interface).opaque
+
+    @property
+    def film(self) -> Film | None:
+        """The film on the boundary, if there is one."""
+        return cast("Dielectric | Metal", self.interface).film if self.boundary else None
 
     def _check_media(self) -> None:
         for side in ("front", "back"):
@@ -112,9 +122,7 @@ class Surface:
         Surface
         """
         form = None if self.form is None else self.form.moved(offset, turn)
-        interface = self.interface
-        if hasattr(interface, "moved"):
-            interface = interface.moved(offset, turn)
+        interface = self.interface if self.element is None else self.element.moved(offset, turn)
         return replace(self, mesh=self.mesh.moved(offset, turn), interface=interface, form=form)
 
 
@@ -180,7 +188,8 @@ class Scene:
         further = [
             (number, True)
             for number, surface in enumerate(self.surfaces)
-            for _ in range(getattr(surface.interface, "branches", 1) - 1)
+            if surface.element is not None
+            for _ in range(surface.element.branches - 1)
         ]
         return (*plain, *further)
 

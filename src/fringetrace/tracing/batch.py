@@ -1,9 +1,8 @@
-"""Batch of rays that a tracing loop advances, as columns of equal length."""
+"""Tables of rays under way and of paths that have ended: equal columns, as the kernels take them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,60 +10,67 @@ import numpy.typing as npt
 from fringetrace.core import Array, ComplexArray, FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Tracks:
-    """Columns shared by paths under way and paths that have ended, one row each.
+class Batch(NamedTuple):
+    """Rays under way, changed in place by each pass. Lengths in metres.
 
-    `lost` is the power given off on the way, `serial` numbers the paths as they are born.
+    Attributes
+    ----------
+    key : (n,) uint64
+        Of the path so far, see `Paths.key`.
+    ray : (n,) int64
+        Number of the ray that was launched.
+    bounces, reflections : (n,) int32
+        Surfaces met, and mirrors among them.
+    serial : (n,) int64
+        Numbers the paths as they are born.
+    lost : (n,) float64
+        Power given off on the way.
+    amplitude : (n,) complex128
+    state : (n, 12) float64
+        Its columns are named in `intersect.kernels`: origin, direction, normal of the face last left, optical
+        path, distance of the start from that face's edge.
+    last : (n,) int64
+        Triangle last left; -1: none.
+    came : (n, 3) float64
+        Direction of the last segment that was longer than 0.
     """
 
-    lost: FloatArray
-    amplitude: ComplexArray
     key: npt.NDArray[np.uint64]
     ray: npt.NDArray[np.int64]
     bounces: npt.NDArray[np.int32]
     reflections: npt.NDArray[np.int32]
     serial: npt.NDArray[np.int64]
-
-    @property
-    def columns(self) -> tuple[Array, ...]:
-        """All columns, in the order of the kernels."""
-        return tuple(vars(self).values())
-
-
-@dataclass(frozen=True, eq=False)
-class Batch(Tracks):
-    """Rays under way, changed in place by the tracing loop. Lengths in metres.
-
-    `state` has the columns that `kernels` names: origin, direction, normal of the face last left,
-    optical path, distance of the start from that face's edge. `last` is the triangle last left
-    (-1: none), `came` (n, 3) the direction of the last leg that was longer than 0.
-    """
-
+    lost: FloatArray
+    amplitude: ComplexArray
     state: FloatArray
     last: npt.NDArray[np.int64]
     came: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Ends(Tracks):
-    """Ended paths, and the reason."""
+class Ends(NamedTuple):
+    """Paths that have ended, where and why (a `Fate`); columns as in `Batch`."""
 
+    key: npt.NDArray[np.uint64]
+    ray: npt.NDArray[np.int64]
+    bounces: npt.NDArray[np.int32]
+    reflections: npt.NDArray[np.int32]
+    serial: npt.NDArray[np.int64]
+    lost: FloatArray
+    amplitude: ComplexArray
     origin: FloatArray
     direction: FloatArray
     length: FloatArray
     fate: npt.NDArray[np.int8]
 
 
-@dataclass(frozen=True, eq=False)
-class Carried:
-    """State of rays in matter, beside a batch or its ends, row by row.
+class Light(NamedTuple):
+    """What rays carry through media, row by row beside a `Batch` or its `Ends`.
 
     Attributes
     ----------
     medium : (n,) int32
-        Number of the medium that the ray is in, see `media.Optics`.
-    index : (n,) float64
+        Number of the medium that the ray is in, see `optics_table.scene_media`.
+    real_index : (n,) float64
         Its real index for the ray: |Re k| / k0.
     fade : (n, 3) float64, or (0, 3) where no medium absorbs
         Im k / k0.
@@ -78,67 +84,65 @@ class Carried:
     """
 
     medium: npt.NDArray[np.int32]
-    index: FloatArray
+    real_index: FloatArray
     fade: FloatArray
     lengths: FloatArray
     field: ComplexArray
     dropped: FloatArray
     bend: FloatArray
 
-    @property
-    def columns(self) -> tuple[Array, ...]:
-        """All columns, in the order of the kernels."""
-        return tuple(vars(self).values())
 
-    @staticmethod
-    def blank(rows: int, media: int, polarised: bool, fading: bool) -> Carried:
-        """Uninitialised table of so many rows."""
-        return Carried(
-            medium=np.empty(rows, dtype=np.int32),
-            index=np.empty(rows),
-            fade=np.empty((rows if fading else 0, 3)),
-            lengths=np.empty((rows, media)),
-            field=np.empty((rows if polarised else 0, 3), dtype=np.complex128),
-            dropped=np.empty(rows),
-            bend=np.empty(rows),
-        )
+Table = TypeVar("Table", Batch, Ends, Light)
 
-    def rows(self, which: Array | slice) -> Carried:
-        """Subset of the rows."""
-        return Carried(*(column[which] if len(column) else column for column in vars(self).values()))
-
-    def grown(self, rows: int) -> Carried:
-        """Larger table that starts with the same rows."""
-        larger = Carried.blank(rows, self.lengths.shape[1], len(self.field) > 0, len(self.fade) > 0)
-        for column, wider in zip(self.columns, larger.columns, strict=True):
-            wider[: len(column)] = column
-        return larger
-
-
-Table = TypeVar("Table", Batch, Ends)
-
-
+# Types and widths of columns that are not (n,) float64.
 TYPES = {
-    "amplitude": np.complex128, "key": np.uint64, "ray": np.int64, "last": np.int64, "serial": np.int64,
-    "bounces": np.int32, "reflections": np.int32, "fate": np.int8,
+    "amplitude": np.complex128, "field": np.complex128, "key": np.uint64, "ray": np.int64, "last": np.int64,
+    "serial": np.int64, "bounces": np.int32, "reflections": np.int32, "medium": np.int32, "fate": np.int8,
 }  # fmt: skip
+WIDTHS = {"origin": 3, "direction": 3, "came": 3, "fade": 3, "field": 3, "state": 12}
 
 
-def blank(kind: type[Table], rows: int) -> Table:
-    """Uninitialised table of so many rows."""
-    wide = {"origin": (rows, 3), "direction": (rows, 3), "came": (rows, 3), "state": (rows, 12)}
-    names = [column.name for column in fields(kind)]
-    return kind(**{name: np.empty(wide.get(name, rows), TYPES.get(name, np.float64)) for name in names})
+def blank(kind: type[Table], rows: int, **widths: int) -> Table:
+    """A table of so many rows, not filled in; `widths` of columns that have none in `WIDTHS`, 0: no rows."""
+    columns: dict[str, Array] = {}
+    for name in kind._fields:
+        width = widths.get(name, WIDTHS.get(name))
+        shape = rows if width is None else (rows, width)
+        columns[name] = np.empty(shape, TYPES.get(name, np.float64))
+        if name in widths and not width:
+            columns[name] = np.empty((0, WIDTHS[name]), TYPES.get(name, np.float64))
+    return kind(**columns)
 
 
-def part(table: Table, start: int, stop: int) -> Table:
-    """Views of a range of rows."""
-    return type(table)(**{name: column[start:stop] for name, column in vars(table).items()})
+def _made(like: Table, columns: list[Array]) -> Table:
+    """A table of the same kind."""
+    made: Table = type(like)(*columns)
+    return made
+
+
+def part(table: Table, rows: slice | Array) -> Table:
+    """Some rows; views for a slice."""
+    return _made(table, [column[rows] if len(column) else column for column in table])
 
 
 def grown(table: Table, rows: int) -> Table:
-    """Larger table that starts with the same rows."""
-    larger = blank(type(table), rows)
-    for name, column in vars(table).items():
-        getattr(larger, name)[: len(column)] = column
-    return larger
+    """The same rows in arrays with room for more; columns without rows stay so."""
+    columns: list[Array] = []
+    column: Array
+    for column in table:
+        wider: Array = np.empty((rows if len(column) else 0, *column.shape[1:]), column.dtype)
+        wider[: len(column)] = column
+        columns.append(wider)
+    return _made(table, columns)
+
+
+def columns(table: Table | None) -> tuple[Array, ...] | None:
+    """The columns of a table, if there is one, as the kernels take them."""
+    return None if table is None else tuple(table)
+
+
+def copy_rows(table: Table, rows: Array, to: Array) -> None:
+    """Copy rows of a table to other rows of it."""
+    for column in table:
+        if len(column):
+            column[to] = column[rows]

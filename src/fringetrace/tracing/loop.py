@@ -1,209 +1,153 @@
-"""Tracing loop of a chunk of rays: hit, interact, split, drop, until all paths have ended."""
+"""The tracing loop of a chunk of rays: find hits, interact, split, end, again, until all paths have ended."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray
-from fringetrace.scene import CCD, Beam, Scene
-from fringetrace.tracing.batch import Batch, Carried, Ends, blank, grown, part
-from fringetrace.tracing.fates import Fate
-from fringetrace.tracing.rays import Rays, launch
-
-if TYPE_CHECKING:
-    from fringetrace.tracing.intersect.embree import Engine, Hits
-    from fringetrace.tracing.intersect.on_forms import Formed
-    from fringetrace.tracing.optics_table import Optics
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """Settings of a trace, shared by all threads.
-
-    `plain`: all surfaces reflect with -1, so that amplitudes follow from the number of bounces.
-    `splits`: some surface sends light both ways, so that a ray may have many ends. `matter` is None where
-    light meets nothing but constant amplitudes in a vacuum.
-    """
-
-    scene: Scene
-    source: Beam | Rays
-    ccd: CCD | None
-    engine: Engine
-    forms: tuple[Formed, ...]
-    passed: frozenset[int]
-    reflection: ComplexArray
-    transmission: ComplexArray
-    screen: tuple[float, ...]
-    max_bounces: int
-    faint: float
-    record: bool
-    plain: bool
-    splits: bool
-    matter: Optics | None = None
-
-    @property
-    def total(self) -> int:
-        """Number of rays."""
-        source = self.source
-        return source.shape[0] * source.shape[1] if isinstance(source, Beam) else len(source)
-
-    def rays(self, first: int, stop: int) -> Rays:
-        """Range of the rays."""
-        source = self.source
-        return launch(source, first, stop) if isinstance(source, Beam) else source.part(first, stop)
-
-
-# What a record keeps of each hit, and what stands where there is none.
-Column = tuple[float, type, tuple[int, ...]]  # fill, dtype, shape of an entry
-HIT: dict[str, Column] = {
-    "triangle": (-1, np.int64, ()),
-    "point": (np.nan, np.float64, (3,)),
-    "branch": (-1, np.int8, ()),
-}
-IN_MEDIA: dict[str, Column] = {
-    "medium": (-1, np.int32, ()),
-    "index": (np.nan, np.float64, ()),
-}
-AT_ELEMENTS: dict[str, Column] = {
-    "departure": (np.nan, np.float64, (3,)),
-    "advance": (0.0, np.float64, ()),
-}
-
-
-class Record:
-    """Hits of the paths of a chunk, by serial number: a table for each pass.
-
-    A path that parts from another inherits what that has met.
-    """
-
-    def __init__(self, start: FloatArray, plan: Plan) -> None:
-        self.start = start.copy()
-        self.key = np.zeros(len(start), dtype=np.uint64)
-        self.passes: list[dict[str, Array]] = []
-        matter = plan.matter
-        self.columns = (
-            HIT | (IN_MEDIA if matter else {}) | (AT_ELEMENTS if matter and matter.elements else {})
-        )
-        # branch that each digit of a key stands for
-        numbers = [number for number, _ in plan.scene.digits]
-        first = 2 * len(plan.scene.surfaces)
-        further = [2 + numbers[first:k].count(numbers[k]) for k in range(first, len(numbers))]
-        self.branches = np.array([0, *[0, 1] * len(plan.scene.surfaces), *further], dtype=np.int8)
-
-    def born(self, parents: Array) -> None:
-        """Add paths that split off."""
-
-        def grown(column: Array) -> Array:
-            return np.concatenate([column, column[parents]])
-
-        if len(parents):
-            self.start, self.key = grown(self.start), grown(self.key)
-            self.passes = [{name: grown(column) for name, column in one.items()} for one in self.passes]
-
-    def met(self, serials: Array, triangle: Array, point: FloatArray) -> None:
-        """Add a pass in which paths hit triangles."""
-        rows = len(self.key)
-        blank: dict[str, Array] = {
-            n: np.full((rows, *shape), fill, kind) for n, (fill, kind, shape) in self.columns.items()
-        }
-        self.passes.append(blank)
-        self.write(serials, triangle=triangle, point=point)
-
-    def went_on(self, serials: Array, key: npt.NDArray[np.uint64], **columns: Array) -> None:
-        """Write the branches that paths took in the latest pass: their keys, and more."""
-        base = np.uint64(len(self.branches))
-        digit = key - base * self.key[serials]  # modulo 2^64, as keys are
-        self.key[serials] = key
-        self.write(serials, branch=self.branches[digit.astype(np.int64)], **columns)
-
-    def write(self, serials: Array, **columns: Array) -> None:
-        """Fill columns of the latest pass."""
-        for name, values in columns.items():
-            if name in self.columns:
-                self.passes[-1][name][serials] = values
-
-    def table(self, name: str, serials: Array, depth: int) -> Array:
-        """Column of the first passes for some paths, (m, depth, ...)."""
-        fill, kind, shape = self.columns[name]
-        table: Array = np.full((len(serials), depth, *shape), fill, kind)
-        for k, one in enumerate(self.passes[:depth]):
-            table[:, k] = one[name][serials]
-        return table
+from fringetrace.core import Array, ComplexArray
+from fringetrace.tracing.batch import Batch, Ends, Light, columns, part
+from fringetrace.tracing.fates import ABSORBED, ALIVE, DETECTED, FAINT
+from fringetrace.tracing.plan import Plan
+from fringetrace.tracing.record import Record
+from fringetrace.tracing.workspace import Workspace
 
 
 @dataclass(frozen=True, eq=False)
 class Chunk:
-    """Ended paths of a chunk of rays, as many as `rows`."""
+    """Consecutive rays whose paths have all ended.
 
+    `first` is the number of the first ray, `launched` their amplitudes; `sorted` tells that each ray has
+    one end, in its own row.
+    """
+
+    first: int
+    launched: ComplexArray
     ends: Ends
-    rows: int
-    rays: Rays
+    light: Light | None
     segments: int
     doubtful: int
-    record: Record | None
-    matter: Carried | None = None
-    contradictions: Array | None = None
+    contradictions: npt.NDArray[np.int64] | None = None
+    record: Record | None = None
+    sorted: bool = False
 
 
-@dataclass(eq=False)
-class Workspace:
-    """Arrays that a thread reuses from chunk to chunk."""
-
-    state: Batch
-    hits: Hits
-    ends: Ends
-    carried: Carried | None = None
-    brought: Carried | None = None
-
-    @staticmethod
-    def blank(plan: Plan, rows: int) -> Workspace:
-        """Uninitialised arrays for so many rays, and for their branches where they split."""
-        from fringetrace.tracing.intersect.embree import Hits
-
-        room = rows * (4 if plan.splits else 1)
-        space = Workspace(blank(Batch, room), Hits.blank(room), blank(Ends, room))
-        if (matter := plan.matter) is not None:
-            shape = len(matter.media), matter.polarised, matter.fading
-            space.carried, space.brought = Carried.blank(room, *shape), Carried.blank(room, *shape)
-        return space
-
-
-def _noted(
-    record: Record, plan: Plan, before: dict[str, Array], space: Workspace, rows: int, ended: slice
-) -> None:
-    """Write down a pass: every path that met something, on its way or at its end."""
-    hits, ends = space.hits, part(space.ends, ended.start, ended.stop)
-    count = len(before["serial"])
-    met = (hits.triangle[:count] >= 0) & (before["bounces"] < plan.max_bounces)
-    met &= ~np.isin(before["serial"], ends.serial[ends.fate == Fate.DETECTED])
-    splits = abs(plan.reflection) * abs(plan.transmission) > 0.0
-    parents = np.flatnonzero(met)
-    parents = parents[splits[plan.engine.owner[hits.triangle[parents]]]]
-    first = len(record.key)
-    serials = np.concatenate([before["serial"][met], np.arange(first, first + len(parents))])
-    chosen = np.concatenate([np.flatnonzero(met), parents])
-    record.born(before["serial"][parents])
-    record.met(serials, hits.triangle[chosen], hits.met[chosen, 1:4])
-    stopped = np.isin(ends.fate, (Fate.ABSORBED, Fate.FAINT))
-    record.went_on(
-        np.concatenate([space.state.serial[:rows], ends.serial[stopped]]),
-        np.concatenate([space.state.key[:rows], ends.key[stopped]]),
-    )
-
-
-def nearest(plan: Plan, space: Workspace, count: int, passed: frozenset[int]) -> int:
-    """Find the nearest hits of the rays of a workspace, on exact forms where there are any.
+def advance(plan: Plan, space: Workspace, first: int, stop: int, ends: Ends | None = None) -> Chunk:
+    """Follow rays to all their ends.
 
     Parameters
     ----------
     plan : Plan
     space : Workspace
-    count : int
-        How many rays it holds.
+    first, stop : int
+        Which rays: from and to.
+    ends : Ends, optional
+        Where they end, a row for each ray, where no ray splits. Default: in the workspace.
+
+    Returns
+    -------
+    Chunk
+        What it holds is overwritten by the next chunk in the same workspace.
+    """
+    from fringetrace.tracing.intersect.embree import aim
+
+    rays = plan.rays(first, stop)
+    space.start(plan, rays, first)
+    record = Record(rays.origin, plan) if plan.record else None
+    passed, bounces = plan.passed, 0
+    fused = plan.mirrors and ends is not None
+    while space.count:
+        space.segments += space.count
+        if fused and bounces:
+            assert ends is not None
+            _rebound(plan, space, bounces, first, ends)
+        else:
+            _bounce(plan, space, passed, record, None if ends is None else (ends, first))
+            passed = frozenset()
+            if fused:
+                aim(plan.engine, space.batch, space.count, space.hits, 0, True, cull=False)
+        bounces += 1
+    return Chunk(
+        first=first,
+        launched=np.asarray(rays.amplitude),
+        ends=part(space.ends, slice(0, space.ended)) if ends is None else ends,
+        light=None if space.end_light is None else part(space.end_light, slice(0, space.ended)),
+        segments=space.segments,
+        doubtful=space.doubtful,
+        contradictions=None if plan.optics.vacuum else space.contradictions.copy(),
+        record=record,
+    )
+
+
+def _bounce(
+    plan: Plan,
+    space: Workspace,
+    passed: frozenset[int],
+    record: Record | None,
+    ordered: tuple[Ends, int] | None,
+) -> None:
+    """Bring all rays to what they meet and on from there.
+
+    `ordered`: ends with a row for each ray, and the number of the first ray.
+    """
+    from fringetrace.tracing.kernels_loop import compact, interact
+
+    count, optics = space.count, plan.optics
+    if ordered is None:
+        space.room((2 if optics.splits else 1) * count)
+        space.room_for_ends((2 if optics.splits else 1) * count)
+    space.doubtful += nearest(plan, space, passed)
+    batch, hits, ended, serials = space.batch, space.hits, space.ended, space.serials
+    before = batch.serial[:count].copy(), batch.bounces[:count].copy()
+    ends, first = (space.ends, -1) if ordered is None else ordered
+    space.count, space.ended, space.serials = interact(
+        count, tuple(batch), columns(space.light), hits.met, hits.triangle, plan.engine.owner,
+        tuple(optics.surfaces), tuple(plan.limits), tuple(ends), columns(space.end_light), ended, first,
+        serials, space.fate, space.parent, space.contradictions,
+    )  # fmt: skip
+    if record is not None:
+        _record_hits(plan, space, record, before, slice(ended, space.ended))
+    if optics.elements:
+        from fringetrace.tracing.elements_pass import act
+
+        space.fate[: space.count] = ALIVE
+        for number, element in optics.elements.items():
+            act(plan, space, number, element, record)
+    if record is not None:
+        _record_branches(space, record, slice(ended, space.ended))
+    if optics.elements:
+        space.room_for_ends(space.count)
+        space.count, space.ended = compact(
+            tuple(space.batch), columns(space.light), 0, space.count, 0, space.fate, tuple(space.ends),
+            columns(space.end_light), space.ended,
+        )  # fmt: skip
+
+
+def _rebound(plan: Plan, space: Workspace, bounces: int, first: int, ends: Ends) -> None:
+    """`_bounce` of rays that have all just left the only body, all of ideal mirrors, in one pass."""
+    from fringetrace.tracing.intersect.embree import second_opinion
+    from fringetrace.tracing.kernels_loop import rebound
+
+    body, hits, count = plan.engine.bodies[0], space.hits, space.count
+    prim = body.embree.run(hits.origin32[:count], hits.direction32[:count])
+    if not body.closed and prim.min() < 0:
+        second_opinion(body, space.batch, count, prim, hits)
+    space.count, _, unsure = rebound(
+        count, bounces, prim, tuple(space.batch), body.packed, plan.engine.digit, tuple(plan.limits),
+        tuple(ends), first, hits.origin32, hits.direction32,
+    )  # fmt: skip
+    space.doubtful += unsure
+
+
+def nearest(plan: Plan, space: Workspace, passed: frozenset[int]) -> int:
+    """Nearest hits of the rays of a workspace, see `embree.find`; on the form where there is one.
+
+    Parameters
+    ----------
+    plan : Plan
+    space : Workspace
     passed : set of surface numbers
         Surfaces to be passed over.
 
@@ -215,119 +159,42 @@ def nearest(plan: Plan, space: Workspace, count: int, passed: frozenset[int]) ->
     if plan.forms:
         from fringetrace.tracing.intersect import on_forms
 
-        return on_forms.find(plan.engine, plan.forms, space.state, count, space.hits, passed)
+        return on_forms.find(plan.engine, plan.forms, space.batch, space.count, space.hits, passed)
     from fringetrace.tracing.intersect import embree
 
-    return embree.find(plan.engine, space.state, count, space.hits, passed)
+    return embree.find(plan.engine, space.batch, space.count, space.hits, passed)
 
 
-def advance(plan: Plan, space: Workspace, ends: Ends | None, first: int, stop: int) -> Chunk:
-    """Trace rays to all their ends.
+def _record_hits(
+    plan: Plan, space: Workspace, record: Record, before: tuple[Array, Array], ended: slice
+) -> None:
+    """Write down a pass: every path that met something, on its way or at its end.
 
-    Parameters
-    ----------
-    plan : Plan
-    space : Workspace
-    ends : Ends, optional
-        Where they end, a row for each ray, where no ray splits. Default: in the workspace.
-    first, stop : int
-        Which rays: from and to.
-
-    Returns
-    -------
-    Chunk
+    `before` are the serial numbers and bounces of the rays before it, `ended` which ends it added.
     """
-    from fringetrace.tracing.intersect.embree import Hits, Limits, aim, follow
-    from fringetrace.tracing.kernels_mirrors import interact
-
-    rays = plan.rays(first, stop)
-    if len(space.state.ray) < len(rays):
-        space.state, space.hits = blank(Batch, len(rays)), Hits.blank(len(rays))
-    start(space.state, rays, first)
-    record = Record(rays.origin, plan) if plan.record else None
-    ordered = ends is not None
-    ends = space.ends if ends is None else ends
-    count, ended, serials, segments, doubtful, bounces = len(rays), 0, len(rays), 0, 0, 1
-    passed = plan.passed
-    limits = Limits(plan.screen, plan.ccd is not None, plan.max_bounces, first)
-    simple = plan.plain and ordered and len(plan.engine.bodies) == 1 and not plan.forms
-    while count:
-        if simple and segments:
-            segments += count
-            count, _, unsure = follow(plan.engine, space.state, count, bounces, space.hits, ends, limits)
-            bounces += 1
-            doubtful += unsure
-            continue
-        if plan.splits and 2 * count > len(space.state.ray):
-            space.state, space.hits = grown(space.state, 4 * count), Hits.blank(4 * count)
-        if not ordered and ended + (2 if plan.splits else 1) * count > len(ends.ray):
-            space.ends = ends = grown(ends, 2 * (ended + 2 * count))
-        state, hits = space.state, space.hits
-        segments += count
-        doubtful += nearest(plan, space, count, passed)
-        passed = frozenset()
-        before: dict[str, Array] = {}
-        if record is not None:
-            before = {"serial": state.serial[:count].copy(), "bounces": state.bounces[:count].copy()}
-        old = ended
-        count, ended, serials = interact(
-            count, state.columns, hits.met, hits.triangle, plan.engine.owner, plan.reflection,
-            plan.transmission, plan.plain, limits.packed, plan.faint, ends.columns, ended,
-            first if ordered else -1, serials,
-        )  # fmt: skip
-        if simple:
-            aim(plan.engine, state, count, hits, 0, True, cull=False)
-        if record is not None:
-            _noted(record, plan, before, space, count, slice(old, ended))
-    return Chunk(ends, ended, rays, segments, doubtful, record)
+    (serial, bounces), hits, ends = before, space.hits, part(space.ends, ended)
+    met = (hits.triangle[: len(serial)] >= 0) & (bounces < plan.limits.max_bounces)
+    met &= ~np.isin(serial, ends.serial[ends.fate == DETECTED])
+    known = len(record.key)
+    parent = space.parent[: space.serials - known]
+    rows = np.concatenate([np.flatnonzero(met), parent])
+    record.born(serial[parent])
+    serials = np.concatenate([serial[met], np.arange(known, space.serials)])
+    record.met(serials, hits.triangle[rows], hits.met[rows, 1:4])
 
 
-def tables(plan: Plan, record: Record, ends: Ends) -> dict[str, Array]:
-    """Recorded paths of a chunk as the padded tables of `Paths`, from `surface` to `advances`.
-
-    Parameters
-    ----------
-    plan : Plan
-    record : Record
-    ends : Ends
-        In the order of the tables' rows.
-
-    Returns
-    -------
-    dict of str to array
-        See `Paths`.
-    """
-    depth, rows = int(ends.bounces.max(initial=0)), ends.serial
-    found = {name: record.table(name, rows, depth) for name in record.columns}
-    triangle = found.pop("triangle")
-    surface = np.where(triangle >= 0, plan.engine.owner[triangle], -1).astype(np.int64)
-    points = np.full((len(rows), depth + 2, 3), np.nan)
-    points[:, 0], points[:, 1 : depth + 1] = record.start[rows], found.pop("point")
-    landed = np.flatnonzero(ends.fate == Fate.DETECTED)
-    points[landed, ends.bounces[landed] + 1] = ends.origin[landed]
-    local = np.where(triangle >= 0, triangle - plan.engine.offset[surface], -1)
-    kept = {"surface": surface, "triangle": local, "points": points, "branch": found.pop("branch")}
-    if plan.matter is not None:
-        media = np.zeros((len(rows), 1), dtype=np.int32), found.pop("medium")
-        index = np.full((len(rows), 1), plan.matter.media[0].real), found.pop("index")
-        kept |= {"media": np.concatenate(media, axis=1), "indices": np.concatenate(index, axis=1)}
-    if "departure" in found:
-        kept["departures"] = np.concatenate([points[:, :1], found["departure"]], axis=1)
-        kept["advances"] = found["advance"]
-    return kept
+def _record_branches(space: Workspace, record: Record, ended: slice) -> None:
+    """Write down how, from where and in what paths went on from their hits of this pass, or ended there."""
+    ends, now = part(space.ends, ended), slice(0, space.count)
+    stopped = np.flatnonzero(np.isin(ends.fate, (ABSORBED, FAINT)))
+    _branches(record, part(ends, stopped), ends.origin[stopped], space.end_light, ended.start + stopped)
+    _branches(record, part(space.batch, now), space.batch.state[now, :3], space.light, now)
 
 
-def start(state: Batch, rays: Rays, first: int) -> None:
-    """Initialise a batch with rays at their start.
-
-    Parameters
-    ----------
-    state : Batch
-        At least as many rows as there are rays.
-    rays : Rays
-    first : int
-        Number of the first of them.
-    """
-    from fringetrace.tracing.kernels_mirrors import begin
-
-    begin(rays.origin, rays.direction, rays.length, first, state.columns)
+def _branches(
+    record: Record, table: Batch | Ends, departure: Array, light: Light | None, rows: Array | slice
+) -> None:
+    media: dict[str, Array] = (
+        {} if light is None else {"medium": light.medium[rows], "index": light.real_index[rows]}
+    )
+    record.went_on(table.serial, table.key, departure=departure, **media)

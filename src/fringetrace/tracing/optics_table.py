@@ -4,44 +4,48 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray, checked_wavelength
-from fringetrace.optics import Dielectric, Metal
 from fringetrace.scene import Scene, Surface
 
 if TYPE_CHECKING:
-    from fringetrace.optics import Element, Material
+    from fringetrace.optics import Dielectric, Element, Interface, Material, Metal
 
-# As in `refractions`, which takes a second to load.
+# What a surface is: of constant amplitudes, or a boundary between two media.
 CONSTANT, BOUNDARY = 0, 1
+# What is followed from a boundary: bits. What is not, is lost to the metal behind it if that is OPAQUE.
 REFLECTED, TRANSMITTED, OPAQUE = 1, 2, 4
 FOLLOW = {"both": REFLECTED | TRANSMITTED, "reflected": REFLECTED, "transmitted": TRANSMITTED}
 # Beyond, float64 keeps nothing of the squares of other indices beside them.
 INDICES = 1e-7, 1e7
 
 
-@dataclass(frozen=True, eq=False)
-class Optics:
-    """Optical constants of a scene at a wavelength, for the kernels.
+class SurfaceTable(NamedTuple):
+    """Surfaces and media of a scene at a wavelength, as the kernels take them.
 
     Attributes
     ----------
-    kind, reflection, transmission, front, back, media, follow
-        For each surface what it is, its amplitudes if they are constant, the numbers of its media, which
-        branches are followed; of each medium the complex index.
+    kind : (surfaces,) int8
+        `CONSTANT` or `BOUNDARY`.
+    reflection, transmission : (surfaces,) complex128
+        Amplitudes where they are constant, see `constants`.
+    front, back : (surfaces,) int32
+        Numbers of the media beside each surface.
+    media : (media,) complex128
+        Refractive indices.
+    follow : (surfaces,) int8
+        Which branches are followed: bits.
     film : tuple
         Where the layers of each surface begin, and their indices and thicknesses from front to back and
         from back to front.
     k0 : float, 1/m
         2 pi over the wavelength, 0 where nothing depends on it.
-    wavelength : float or None, metres
-    polarised : bool
-    elements : dict
-        Thin elements by the number of their surface.
+    ideal : bool
+        All surfaces reflect with -1 in a vacuum, so that amplitudes follow from the number of bounces.
     """
 
     kind: npt.NDArray[np.int8]
@@ -53,26 +57,40 @@ class Optics:
     follow: npt.NDArray[np.int8]
     film: tuple[Array, ComplexArray, Array, tuple[ComplexArray, Array]]
     k0: float
+    ideal: bool
+
+
+@dataclass(frozen=True, eq=False)
+class SceneOptics:
+    """What light meets in a scene.
+
+    Attributes
+    ----------
+    surfaces : SurfaceTable
+    vacuum : bool
+        Light meets nothing but constant amplitudes in a vacuum.
+    wavelength : float or None, metres
+    polarised : bool
+    elements : dict
+        Thin elements by the number of their surface.
+    """
+
+    surfaces: SurfaceTable
+    vacuum: bool
     wavelength: float | None
     polarised: bool
     elements: dict[int, Element]
 
     @property
-    def columns(self) -> tuple[Array, ...]:
-        """Tables of surfaces and media."""
-        return (
-            self.kind, self.reflection, self.transmission, self.front, self.back, self.media, self.follow,
-        )  # fmt: skip
-
-    @property
     def fading(self) -> bool:
-        """Whether any medium absorbs."""
-        return bool(self.media.imag.any())
+        """Whether some medium absorbs."""
+        return bool(self.surfaces.media.imag.any())
 
     @property
-    def branches(self) -> int:
-        """Maximum number of branches at one surface."""
-        return max([2, *(element.branches for element in self.elements.values())])
+    def splits(self) -> bool:
+        """Whether a ray may have several ends."""
+        table = self.surfaces
+        return not self.vacuum or bool((abs(table.reflection) * abs(table.transmission)).any())
 
 
 def scene_media(scene: Scene) -> tuple[Material, ...]:
@@ -93,8 +111,7 @@ def scene_media(scene: Scene) -> tuple[Material, ...]:
 
 
 def _film(surface: Surface) -> tuple[tuple[Material, float], ...]:
-    film = surface.interface.film if isinstance(surface.interface, (Dielectric, Metal)) else None
-    return () if film is None else film.layers
+    return () if surface.film is None else surface.film.layers
 
 
 def plain(scene: Scene, polarised: bool) -> bool:
@@ -109,7 +126,7 @@ def plain(scene: Scene, polarised: bool) -> bool:
     -------
     bool
     """
-    acting = any(surface.boundary or hasattr(surface.interface, "act") for surface in scene.surfaces)
+    acting = any(surface.interface.kind != "constant" for surface in scene.surfaces)
     if acting or polarised:
         return False
     around = scene.medium
@@ -135,13 +152,13 @@ def needs(scene: Scene) -> str | None:
     for surface in scene.surfaces:
         if _film(surface):
             return f"{surface.name} has a film"
-        if getattr(surface.interface, "chromatic", False):
+        if surface.interface.chromatic:
             return f"{surface.name} depends on it"
     return None
 
 
-def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | None:
-    """Optical constants of media, boundaries and elements of a scene at a wavelength.
+def optics(scene: Scene, wavelength: float | None, polarised: bool) -> SceneOptics:
+    """The media, boundaries and elements of a scene at a wavelength.
 
     Parameters
     ----------
@@ -152,8 +169,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
 
     Returns
     -------
-    Optics or None
-        None where light meets nothing but constant amplitudes in a vacuum.
+    SceneOptics
 
     Raises
     ------
@@ -163,9 +179,8 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
     """
     if wavelength is not None:
         wavelength = checked_wavelength(wavelength)
-    if plain(scene, polarised):
-        return None
-    why = needs(scene)
+    vacuum = plain(scene, polarised)
+    why = None if vacuum else needs(scene)
     if wavelength is None and why is not None:
         raise ValueError(f"trace wavelength: expected one, since {why}, got None")
     elements = thin(scene)
@@ -173,25 +188,29 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics | 
         if element.polarised and not polarised:
             name = scene.surfaces[number].name
             raise ValueError(f"{name}: expected light with a polarisation, got a scalar beam")
+    table = _table(scene, 1.0 if wavelength is None else wavelength, vacuum)
+    if wavelength is not None:
+        table = table._replace(k0=2.0 * math.pi / wavelength)
+    return SceneOptics(table, vacuum, None if vacuum else wavelength, polarised, elements)
+
+
+def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:
     known = scene_media(scene)
-    at = 1.0 if wavelength is None else wavelength
     numbers = {medium: number for number, medium in enumerate(known)}
     sides = [[s.front or scene.around, s.back or scene.around] for s in scene.surfaces]
-    table = np.array([[numbers[medium] for medium in side] for side in sides], dtype=np.int32)
+    beside = np.array([[numbers[medium] for medium in side] for side in sides], dtype=np.int32)
     reflection, transmission = constants(scene)
-    return Optics(
+    return SurfaceTable(
         kind=np.array([BOUNDARY if s.boundary else CONSTANT for s in scene.surfaces], dtype=np.int8),
         reflection=reflection,
         transmission=transmission,
-        front=table[:, 0].copy(),
-        back=table[:, 1].copy(),
-        media=np.array([_index(medium, at) for medium in known]),
+        front=beside[:, 0].copy(),
+        back=beside[:, 1].copy(),
+        media=np.array([_index(medium, wavelength) for medium in known]),
         follow=np.array([followed_branches(surface) for surface in scene.surfaces], dtype=np.int8),
-        film=_layers(scene, at),
-        k0=0.0 if wavelength is None else 2.0 * math.pi / wavelength,
-        wavelength=wavelength,
-        polarised=polarised,
-        elements=elements,
+        film=_layers(scene, wavelength),
+        k0=0.0,
+        ideal=vacuum and bool((reflection == -1.0).all() and not transmission.any()),
     )
 
 
@@ -214,8 +233,8 @@ def thin(scene: Scene) -> dict[int, Element]:
     -------
     dict of int to Element
     """
-    acting = ((i, surface.interface) for i, surface in enumerate(scene.surfaces))
-    return {i: cast("Element", interface) for i, interface in acting if hasattr(interface, "act")}
+    found = enumerate(surface.element for surface in scene.surfaces)
+    return {number: element for number, element in found if element is not None}
 
 
 def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
@@ -233,20 +252,20 @@ def constants(scene: Scene) -> tuple[ComplexArray, ComplexArray]:
     table = np.zeros((2, len(scene.surfaces)), dtype=np.complex128)
     for number, surface in enumerate(scene.surfaces):
         interface = surface.interface
-        if hasattr(interface, "act"):
+        if interface.kind == "element":
             table[1, number] = 1.0
-        elif not isinstance(interface, (Dielectric, Metal)):
-            table[:, number] = interface.reflection, interface.transmission
+        elif interface.kind == "constant":
+            constant = cast("Interface", interface)
+            table[:, number] = constant.reflection, constant.transmission
     return table[0], table[1]
 
 
 def followed_branches(surface: Surface) -> int:
     """Bits of the branches that are traced at a surface: reflected, transmitted, or opaque."""
-    if isinstance(surface.interface, Metal):
-        return REFLECTED | OPAQUE
-    if isinstance(surface.interface, Dielectric):
-        return FOLLOW[surface.interface.follow]
-    return REFLECTED | TRANSMITTED
+    if not surface.boundary:
+        return REFLECTED | TRANSMITTED
+    boundary = cast("Dielectric | Metal", surface.interface)
+    return FOLLOW[boundary.follow] | (OPAQUE if boundary.opaque else 0)
 
 
 def _layers(scene: Scene, wavelength: float) -> tuple[Array, ComplexArray, Array, tuple[ComplexArray, Array]]:

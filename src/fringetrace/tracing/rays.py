@@ -183,14 +183,14 @@ def launch(beam: Beam, start: int = 0, stop: int | None = None) -> Rays:
     ValueError
         If the profile gives something other than one finite number a ray.
     """
-    from fringetrace.tracing import kernels_mirrors
+    from fringetrace.tracing import kernels_rays
 
     rows, columns = beam.shape
     start, stop, _ = slice(start, stop).indices(rows * columns)
     count = max(0, stop - start)
     u, v, n = beam.axes
     origin, direction = np.empty((count, 3)), np.empty((count, 3))
-    kernels_mirrors.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
+    kernels_rays.launch(start, rows, columns, beam.centre, u, v, n, *beam.size, origin, direction)
     amplitude = np.broadcast_to(np.complex128(1.0), (count,))  # read-only, and takes no room
     if beam.profile is not None:
         offset = origin - beam.centre

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fringetrace.core import ComplexArray, checked_wavelength
-from fringetrace.optics import Dielectric, Metal
 from fringetrace.scene import Surface
 from fringetrace.tracing.fates import Fate
 from fringetrace.tracing.optics_table import REFLECTED, followed_branches, needs, scene_media
@@ -105,8 +104,7 @@ def _straight_on(
     from fringetrace.optics import coefficients
 
     front, back = surface.front or around, surface.back or around
-    assert isinstance(surface.interface, (Dielectric, Metal))
-    film = surface.interface.film
+    film = surface.film
     if film is not None and front == back and film != film.reversed():
         raise ValueError(
             f"wavelength: expected that of the trace, since {surface.name} has a film that is not the same "

@@ -8,18 +8,22 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import dataclass
 from numbers import Real
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fringetrace.core import Array, ComplexArray, checked_whole
+from fringetrace.core import ComplexArray, checked_whole
 from fringetrace.scene import CCD, Beam, Scene, screen
-from fringetrace.tracing.batch import Carried, Ends, blank, part
-from fringetrace.tracing.loop import Plan, Record, Workspace, advance, tables
+from fringetrace.tracing.batch import Ends, Light, blank, part
+from fringetrace.tracing.loop import Chunk, advance
 from fringetrace.tracing.paths import Paths, join
+from fringetrace.tracing.plan import Plan, TraceLimits
 from fringetrace.tracing.rays import Rays
+from fringetrace.tracing.record import tables
+from fringetrace.tracing.workspace import Workspace
 
 if TYPE_CHECKING:
     from fringetrace.tracing.intersect.embree import Engine
@@ -33,6 +37,32 @@ CHUNK = 32768
 MOST = 2**31 - 2
 
 
+@dataclass(frozen=True)
+class Options:
+    """How to trace; see `trace`."""
+
+    wavelength: float | None
+    max_bounces: int
+    min_amplitude: float
+    record: bool
+    threads: int | None
+    chunk: int | None
+    progress: Progress | None
+
+    def __post_init__(self) -> None:
+        checked_whole(self.max_bounces, 0, "max_bounces")
+        least = self.min_amplitude
+        if not (isinstance(least, Real) and np.isfinite(least) and least >= 0.0):
+            raise ValueError(f"min_amplitude: expected a number of at least 0, got {least!r}")
+        for name in ("threads", "chunk"):
+            if getattr(self, name) is not None:
+                checked_whole(getattr(self, name), 1, name)
+
+    def rays_at_a_time(self, splits: bool) -> int:
+        """Rays that a thread follows at a time: fewer where each may become several."""
+        return self.chunk or (CHUNK // 4 if splits else CHUNK)
+
+
 def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
     if all(surface.form is None for surface in scene.surfaces):
         return ()
@@ -41,76 +71,56 @@ def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
     return formed(scene, engine)
 
 
-def _plan(
-    scene: Scene, source: Beam | Rays, ccd: CCD | None, wavelength: float | None, max_bounces: int,
-    min_amplitude: float, record: bool,
-) -> Plan:  # fmt: skip
+def _plan(scene: Scene, source: Beam | Rays, ccd: CCD | None, options: Options) -> Plan:
     if not isinstance(scene, Scene):
         raise TypeError(f"trace: expected a Scene, got {type(scene).__name__}")
     if not isinstance(source, (Beam, Rays)):
         raise TypeError(f"trace: expected a Beam or Rays, got {type(source).__name__}")
     if ccd is not None and not isinstance(ccd, CCD):
         raise TypeError(f"trace: expected a CCD or None, got {type(ccd).__name__}")
-    most = min(checked_whole(max_bounces, 0, "max_bounces"), MOST)
-    if not (isinstance(min_amplitude, Real) and np.isfinite(min_amplitude) and min_amplitude >= 0.0):
-        raise ValueError(f"min_amplitude: expected a number of at least 0, got {min_amplitude!r}")
     from fringetrace.tracing.intersect.embree import build
-    from fringetrace.tracing.optics_table import constants, optics
+    from fringetrace.tracing.optics_table import optics
 
-    matter = optics(scene, wavelength, source.polarisation is not None)
+    met = optics(scene, options.wavelength, source.polarisation is not None)
     passed = frozenset(scene.index(name) for name in source.passes)
     engine = build(
         scene, passed | {i for i, surface in enumerate(scene.surfaces) if surface.form is not None}
     )
-    reflection, transmission = constants(scene)
-    return Plan(
-        scene=scene,
-        source=source,
-        ccd=ccd,
-        engine=engine,
-        forms=_forms(scene, engine),
-        passed=passed,
-        reflection=reflection,
-        transmission=transmission,
+    limits = TraceLimits(
         screen=(0.0,) * 15 if ccd is None else screen(ccd),
-        max_bounces=most,
-        faint=float(min_amplitude) ** 2,
-        record=record,
-        plain=matter is None and bool((reflection == -1.0).all() and not transmission.any()),
-        splits=matter is not None or bool((abs(reflection) * abs(transmission)).any()),
-        matter=matter,
+        has_screen=ccd is not None,
+        max_bounces=min(int(options.max_bounces), MOST),
+        faint=float(options.min_amplitude) ** 2,
+        key_base=len(scene.digits) + 1,
     )
+    forms = _forms(scene, engine)
+    return Plan(scene, source, ccd, engine, forms, passed, met, limits, options.record)
 
 
-def _paths(
-    plan: Plan, ends: Ends, first: int, launched: ComplexArray, segments: int, doubtful: int,
-    record: Record | None = None, whole: bool = False, matter: Carried | None = None,
-    contradictions: Array | None = None,
-) -> Paths:  # fmt: skip
-    """The table of what has ended, sorted by ray; `launched` are the amplitudes from ray `first` on.
-
-    `whole`: each ray is in its row already, and the arrays may be kept.
-    """
-    if not whole:
-        from fringetrace.tracing.kernels_mirrors import sort
+def _paths(plan: Plan, chunk: Chunk) -> Paths:
+    """The table of what has ended, sorted by ray."""
+    ends, light, launched = chunk.ends, chunk.light, chunk.launched
+    if not chunk.sorted:
+        from fringetrace.tracing.kernels_rays import sort
 
         # a ray's ends come in an order that does not depend on other rays: a stable sort keeps it
-        order = sort(ends.ray, first, len(launched))
-        ends = Ends(**{name: column[order] for name, column in vars(ends).items()})
-        matter = None if matter is None else matter.rows(order)
+        order = sort(ends.ray, chunk.first, len(launched))
+        ends = part(ends, order)
+        light = None if light is None else part(light, order)
     # a broadcast 1 (no strides) stands for amplitudes that are all 1
-    relative = launched[ends.ray - first] if len(ends.ray) > len(launched) else launched
-    if plan.plain:
+    relative = launched[ends.ray - chunk.first] if len(ends.ray) > len(launched) else launched
+    if plan.optics.surfaces.ideal:
         reflections, lost = ends.bounces, np.zeros(len(ends.ray))
         amplitude = np.array([1.0, -1.0], dtype=np.complex128)[ends.bounces & 1]
         if launched.strides != (0,):  # not all 1
             amplitude *= relative
     else:
         reflections, lost = ends.reflections, ends.lost * np.abs(relative) ** 2
-        amplitude = (abs(relative) if _polarised(plan) else relative) * ends.amplitude
-    extra: dict[str, Any] = {} if record is None else dict(tables(plan, record, ends))
-    if matter is not None:
-        extra |= _matter(plan, matter, relative)
+        polarised = plan.optics.polarised and light is not None
+        amplitude = (abs(relative) if polarised else relative) * ends.amplitude
+    extra: dict[str, Any] = {} if chunk.record is None else dict(tables(plan, chunk.record, ends))
+    if light is not None:
+        extra |= _in_media(plan, light, relative)
     return Paths(
         ray=ends.ray,
         fate=ends.fate,
@@ -124,52 +134,38 @@ def _paths(
         key=ends.key,
         area=plan.source.area,
         incident=float(len(launched) if launched.strides == (0,) else (np.abs(launched) ** 2).sum()),
-        segments=segments,
-        doubtful=doubtful,
+        segments=chunk.segments,
+        doubtful=chunk.doubtful,
         scene=plan.scene,
         source=plan.source,
         ccd=plan.ccd,
-        contradictions=contradictions,
-        min_amplitude=math.sqrt(plan.faint),
+        contradictions=chunk.contradictions,
+        min_amplitude=math.sqrt(plan.limits.faint),
         **extra,
     )
 
 
-def _polarised(plan: Plan) -> bool:
-    return plan.matter is not None and plan.matter.polarised
-
-
-def _matter(plan: Plan, matter: Carried, relative: ComplexArray) -> dict[str, Any]:
-    """What paths through matter bring along."""
-    assert plan.matter is not None
+def _in_media(plan: Plan, light: Light, relative: ComplexArray) -> dict[str, Any]:
+    """What paths through media bring along."""
     return {
-        "wavelength": plan.matter.wavelength,
-        "medium": matter.medium,
-        "index": matter.index,
-        "lengths": matter.lengths,
-        "field": matter.field * relative[:, None] if plan.matter.polarised else None,
-        "dropped": matter.dropped * np.abs(relative) ** 2,
-        "bend": matter.bend,
+        "wavelength": plan.optics.wavelength,
+        "medium": light.medium,
+        "index": light.real_index,
+        "lengths": light.lengths,
+        "field": light.field * relative[:, None] if plan.optics.polarised else None,
+        "dropped": light.dropped * np.abs(relative) ** 2,
+        "bend": light.bend,
     }
 
 
-def _chunk(plan: Plan, chunk: int | None) -> int:
-    """Rays to be followed at a time: fewer where each may become several."""
-    if chunk is None:
-        return CHUNK // 4 if plan.splits else CHUNK
-    return checked_whole(chunk, 1, "chunk")
-
-
-def _pooled(
-    work: Callable[[int, int], Result], total: int, threads: int | None, chunk: int, progress: Progress | None
-) -> Iterator[Result]:
+def _pooled(work: Callable[[int, int], Result], total: int, chunk: int, options: Options) -> Iterator[Result]:
     """Work on chunks, some ahead of the reader on as many threads; the results in order."""
     if total <= chunk:  # a thread takes longer to start than a few rays to trace
         yield work(0, total)
-        if progress is not None:
-            progress(total, total)
+        if options.progress is not None:
+            options.progress(total, total)
         return
-    workers = (os.cpu_count() or 1) if threads is None else threads
+    workers = options.threads or os.cpu_count() or 1
     starts = iter(range(0, max(total, 1), chunk))
     with ThreadPoolExecutor(workers, thread_name_prefix="fringetrace") as pool:
         waiting: deque[tuple[int, Future[Result]]] = deque()
@@ -182,8 +178,8 @@ def _pooled(
                     return
                 done, future = waiting.popleft()
                 yield future.result()
-                if progress is not None:
-                    progress(done, total)
+                if options.progress is not None:
+                    options.progress(done, total)
         finally:
             for _, future in waiting:
                 future.cancel()
@@ -207,30 +203,21 @@ class _Workspaces:
         self.idle.put(space)
 
 
-def _in_chunks(plan: Plan, threads: int | None, chunk: int, progress: Progress | None) -> Iterator[Paths]:
+def _in_chunks(plan: Plan, options: Options) -> Iterator[Paths]:
     """Paths of consecutive rays."""
+    chunk = options.rays_at_a_time(plan.optics.splits)
     spaces = _Workspaces(plan, chunk)
 
     def work(first: int, stop: int) -> Paths:
         with spaces.one() as space:
-            if plan.matter is None:
-                done = advance(plan, space, None, first, stop)
-            else:
-                from fringetrace.tracing.loop_media import traverse
+            return _paths(plan, advance(plan, space, first, stop))
 
-                done = traverse(plan, space, first, stop)
-            launched = np.asarray(done.rays.amplitude)
-            ends = part(done.ends, 0, done.rows)
-            return _paths(
-                plan, ends, first, launched, done.segments, done.doubtful, done.record,
-                matter=done.matter, contradictions=done.contradictions,
-            )  # fmt: skip
-
-    return _pooled(work, plan.total, threads, chunk, progress)
+    return _pooled(work, plan.total, chunk, options)
 
 
-def _at_once(plan: Plan, threads: int | None, chunk: int, progress: Progress | None) -> Paths:
+def _at_once(plan: Plan, options: Options) -> Paths:
     """All rays in one table from the start: where no ray splits, each has its row."""
+    chunk = options.rays_at_a_time(False)
     spaces = _Workspaces(plan, chunk)
     ends = blank(Ends, plan.total)
     uniform = isinstance(plan.source, Beam) and plan.source.profile is None
@@ -240,14 +227,14 @@ def _at_once(plan: Plan, threads: int | None, chunk: int, progress: Progress | N
 
     def work(first: int, stop: int) -> tuple[int, int]:
         with spaces.one() as space:
-            done = advance(plan, space, part(ends, first, stop), first, stop)
+            done = advance(plan, space, first, stop, part(ends, slice(first, stop)))
         if not uniform:
-            launched[first:stop] = done.rays.amplitude
+            launched[first:stop] = done.launched
         return done.segments, done.doubtful
 
-    counts = list(_pooled(work, plan.total, threads, chunk, progress))
+    counts = list(_pooled(work, plan.total, chunk, options))
     segments, doubtful = (sum(count) for count in zip(*counts, strict=True))
-    return _paths(plan, ends, 0, launched, segments, doubtful, whole=True)
+    return _paths(plan, Chunk(0, launched, ends, None, segments, doubtful, sorted=True))
 
 
 def stream(
@@ -275,9 +262,8 @@ def stream(
     Paths
         Of consecutive rays, in their order.
     """
-    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
-    workers = None if threads is None else checked_whole(threads, 1, "threads")
-    return _in_chunks(plan, workers, _chunk(plan, chunk), progress)
+    options = Options(wavelength, max_bounces, min_amplitude, record, threads, chunk, progress)
+    return _in_chunks(_plan(scene, source, ccd, options), options)
 
 
 def trace(
@@ -330,9 +316,8 @@ def trace(
         For counts or amplitudes below 0, or names of unknown surfaces in the source's `passes`; for a
         wavelength that is missing, or outside the range of a material.
     """
-    plan = _plan(scene, source, ccd, wavelength, max_bounces, min_amplitude, record)
-    workers = None if threads is None else checked_whole(threads, 1, "threads")
-    size = _chunk(plan, chunk)
-    if not (plan.splits or record):
-        return _at_once(plan, workers, size, progress)
-    return join(list(_in_chunks(plan, workers, size, progress)))
+    options = Options(wavelength, max_bounces, min_amplitude, record, threads, chunk, progress)
+    plan = _plan(scene, source, ccd, options)
+    if not (plan.optics.splits or record):
+        return _at_once(plan, options)
+    return join(list(_in_chunks(plan, options)))

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
 from fringetrace.scene import Scene
-from fringetrace.tracing.batch import Batch, Ends
+from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.intersect.bodies import Body, IntArray, group, unite
 
 
@@ -64,21 +64,6 @@ class Hits:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Limits:
-    """Limits of paths: the sensor (see `screen`), the number of bounces; and the first ray's number."""
-
-    screen: tuple[float, ...]
-    has_screen: bool
-    max_bounces: int
-    first: int
-
-    @property
-    def packed(self) -> tuple[tuple[float, ...], bool, int]:
-        """Limits in the form that the kernels read."""
-        return self.screen, self.has_screen, self.max_bounces
-
-
 def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
     """Build the intersection engine of a scene, once; it is kept with the scene.
 
@@ -126,7 +111,7 @@ def aim(
     return count
 
 
-def _second(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.int32], hits: Hits) -> None:
+def second_opinion(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.int32], hits: Hits) -> None:
     """Other opinions, a little aside, on suspicious answers; -2 where one of them differs.
 
     Three of rays that come from elsewhere, one of rays that have just left this body.
@@ -183,7 +168,7 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
             continue
         body.prepare()
         prim = body.embree.run(origin32[:count], direction32[:count])
-        _second(body, batch, count, prim, hits)
+        second_opinion(body, batch, count, prim, hits)
         doubtful += kernels.measure(
             hits.sent, count, prim, batch.state, batch.last, batch.came, body.packed, hits.met, hits.triangle,
         )  # fmt: skip
@@ -191,44 +176,3 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
         hits.met[:rows, 0] = np.inf
         hits.triangle[:rows] = -1
     return doubtful
-
-
-def follow(
-    engine: Engine, batch: Batch, rows: int, bounces: int, hits: Hits, ends: Ends, limits: Limits
-) -> tuple[int, int, int]:
-    """Trace one more bounce of rays that all left the only body, of ideal mirrors.
-
-    Does what `find` and `bounces.interact` do, without amplitudes and in one pass over the rays.
-
-    Parameters
-    ----------
-    engine : Engine
-        Of one body.
-    batch : Batch
-    rows : int
-        How many rays it holds.
-    bounces : int
-        How often each has been reflected.
-    hits : Hits
-        Its float32 rays are those of the batch; they are brought up to date.
-    ends : Ends
-    limits : Limits
-
-    Returns
-    -------
-    rows, ended, doubtful : int
-        How many rays go on, have ended now, were decided exactly.
-    """
-    from fringetrace.tracing.kernels_mirrors import rebound
-
-    body = engine.bodies[0]
-    prim = body.embree.run(hits.origin32[:rows], hits.direction32[:rows])
-    if not body.closed and prim.min() < 0:
-        _second(body, batch, rows, prim, hits)
-    result: tuple[int, int, int] = rebound(
-        rows, bounces, prim, (batch.key, batch.ray, batch.state, batch.last, batch.came), body.packed,
-        engine.digit, np.uint64(engine.base), limits.packed,
-        (ends.key, ends.ray, ends.bounces, ends.origin, ends.direction, ends.length, ends.fate),
-        limits.first, hits.origin32, hits.direction32,
-    )  # fmt: skip
-    return result

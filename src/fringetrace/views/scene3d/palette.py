@@ -185,4 +185,4 @@ def look(surface: Surface) -> tuple[str, str, float]:
     for kind, name, colour, opacity in KINDS:
         if isinstance(surface.interface, kind):
             return name, colour, opacity
-    return ELEMENT if hasattr(surface.interface, "act") else OTHER
+    return OTHER if surface.element is None else ELEMENT

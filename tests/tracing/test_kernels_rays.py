@@ -1,4 +1,4 @@
-"""The loops of the bounce passes, one by one."""
+"""Launching and sorting rays, and reflecting them, one by one."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from hypothesis import given, strategies as st
 import fringetrace as ft
 from fringetrace.core.vectors import frame, unit
 from fringetrace.optics.interfaces import reflect
-from fringetrace.tracing import kernels_mirrors
+from fringetrace.tracing import kernels_boundary, kernels_rays
 from fringetrace.tracing.rays import launch
 
 EPS = float(np.finfo(np.float64).eps)
@@ -17,7 +17,7 @@ seeds = st.integers(0, 2**32 - 1)
 @given(rays=st.lists(st.integers(0, 6), max_size=60), first=st.integers(0, 1000))
 def test_ends_are_sorted_by_ray_and_stay_in_order(rays, first):
     ray = np.array(rays, dtype=np.int64) + first
-    assert np.array_equal(kernels_mirrors.sort(ray, first, 7), np.argsort(ray, kind="stable"))
+    assert np.array_equal(kernels_rays.sort(ray, first, 7), np.argsort(ray, kind="stable"))
 
 
 @given(seed=seeds)
@@ -26,7 +26,7 @@ def test_reflections_are_those_of_the_formula(seed):
     direction, normal = unit(rng.normal(size=(2, 3)))
     expected = reflect(direction[None], normal[None])[0]
     for steps in (1, 8):  # the eighth is brought back to length 1
-        after = kernels_mirrors.bounced(*direction, *normal, direction @ normal, steps)
+        after = kernels_boundary.reflected(*direction, *normal, direction @ normal, steps)
         np.testing.assert_allclose(after, expected, rtol=0, atol=4 * EPS)
 
 
@@ -34,7 +34,7 @@ def test_a_direction_keeps_its_length_over_many_reflections():
     rng = np.random.default_rng(3)
     direction = np.array([0.6, 0.0, 0.8])
     for steps, normal in enumerate(unit(rng.normal(size=(5000, 3)))):
-        direction = np.array(kernels_mirrors.bounced(*direction, *normal, direction @ normal, steps))
+        direction = np.array(kernels_boundary.reflected(*direction, *normal, direction @ normal, steps))
     assert np.linalg.norm(direction) == pytest.approx(1.0, rel=16 * EPS, abs=0)
 
 
