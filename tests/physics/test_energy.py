@@ -78,7 +78,7 @@ def cavity(splitter, gap, most=200):
     return paths, project(paths, through), project(paths, back)
 
 
-@pytest.mark.parametrize("reflectance", [0.04, 0.36, 0.8])
+@pytest.mark.parametrize("reflectance", [0.04, 0.36, pytest.param(0.8, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("gap", [1e-3, 1.0001234e-3, 1.00017e-3])
 def test_the_partial_waves_of_a_cavity_add_up_to_airy(gap, reflectance):
     r, t = 1j * math.sqrt(reflectance), math.sqrt(1 - reflectance)

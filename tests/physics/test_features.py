@@ -106,7 +106,7 @@ def all_but(*dark):
     return ranges
 
 
-@pytest.mark.parametrize("count", [8, 16])
+@pytest.mark.parametrize("count", [8, pytest.param(16, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("width", [60 * um, 8 * um])
 def test_a_wire_before_a_curved_mirror_casts_its_shadow(width, count):
     tape = shapes.plate(width, 18 * mm).moved((X, 0, 25 * mm))
@@ -115,7 +115,7 @@ def test_a_wire_before_a_curved_mirror_casts_its_shadow(width, count):
     assert rms(image, scanned(64, all_but(edges))) < COVERAGE
 
 
-@pytest.mark.parametrize("count", [8, 16])
+@pytest.mark.parametrize("count", [8, pytest.param(16, marks=pytest.mark.slow)])
 def test_a_round_wire_casts_its_shadow(count):
     """No edge of its mesh is one of its shadow's, but facets turn away from the light there."""
     radius, place = 20 * um, (X, 0, 25 * mm)

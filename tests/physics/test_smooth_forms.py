@@ -60,7 +60,9 @@ def test_patches_come_nearer_to_a_sphere_as_the_fourth_power():
     assert tilt[1] / tilt[2] > 7.0
 
 
-@pytest.mark.parametrize(("kind", "given"), [("even", True), ("skew", True), ("skew", False)])
+@pytest.mark.parametrize(
+    ("kind", "given"), [("even", True), ("skew", True), pytest.param("skew", False, marks=pytest.mark.slow)]
+)
 def test_patches_come_nearer_to_a_torus_as_the_third_power_or_better(kind, given):
     rng = np.random.default_rng(2)
     count = 1500

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from fringetrace.core import FloatArray, nm, rotation
+from fringetrace.core import FloatArray, nm, rotation, short_repr
 from fringetrace.geometry import Mesh, Sphere, height_map, plate
 from fringetrace.instruments import layout
 from fringetrace.instruments.arms import Arms, Mark
@@ -109,16 +110,17 @@ def fizeau(
     layout.checked_tilt("fizeau", wedge)
     top = _checked_top(float(surface.mesh.bounds[1, 2]), gap, thickness)
     arm = ROOM * max(*size, top)
-    plates = _plate(
-        size, gap, thickness, glass, between, reference_tilt, radius, wedge, (coating, back_coating)
-    )
+    cover = ReferencePlate(
+        size, gap, as_material(glass), as_material(between), reference_tilt, radius, thickness, wedge,
+        (coating, back_coating),
+    )  # fmt: skip
     x, y, z = np.eye(3)
     around = as_material(glass if thickness is None else 1.0)
     scene = Scene(
         (
             Surface(_crossing(SPAN * arm), splitter, "splitter"),
             surface.moved(-arm * z),
-            *(face.moved(-arm * z) for face in plates),
+            *(face.moved(-arm * z) for face in cover.surfaces),
         ),
         around,
     )
@@ -150,41 +152,57 @@ def _crossing(reach: float) -> Mesh:
     return flat.moved(turn=rotation((0.0, 1.0, 0.0), math.pi / 4.0))
 
 
-def _plate(
-    size: tuple[float, float],
-    gap: float,
-    thickness: float | None,
-    glass: Material | float | str,
-    between: Material | float | str,
-    tilt: tuple[float, float],
-    radius: float,
-    wedge: tuple[float, float],
-    coatings: tuple[Film | None, Film | None],
-) -> tuple[Surface, ...]:
-    """The reference face, its front in the glass, and the upper face if there is one."""
-    face = (
-        _face(size, radius)
-        .moved(turn=layout.standing_rotation(layout.tilted_normal(tilt)))
-        .moved((0.0, 0.0, gap))
-    )
-    inside, filled = as_material(glass), as_material(between)
-    form = None
-    if math.isfinite(radius):
-        centre = np.array([0.0, 0.0, gap]) + radius * layout.tilted_normal(tilt)
-        form = Sphere(centre, abs(radius))
-    reference = Surface(face, Dielectric(film=coatings[0]), "reference", form, inside, filled)
-    if thickness is None:
-        return (reference,)
-    wide = 4.0 * max(size)
-    upper = plate(wide, wide).moved(turn=layout.standing_rotation(layout.tilted_normal(wedge)))
-    return reference, Surface(
-        upper.moved((0.0, 0.0, gap + thickness)),
-        Dielectric(film=coatings[1]),
-        "upper face",
-        None,
-        None,
-        inside,
-    )
+@dataclass(frozen=True)
+class ReferencePlate:
+    """Plate over the sample of a Fizeau interferometer; its lower face is the reference.
+
+    Parameters
+    ----------
+    size : (width, height), metres
+        Of the image.
+    gap : float, metres
+        Height of the reference face.
+    glass, between : Material
+        Of the plate, and below it.
+    tilt : (tilt_x, tilt_y), radians
+    radius : float, metres
+        Of the reference face; infinite: flat.
+    thickness : float or None, metres
+        None: there is no upper face.
+    wedge : (x, y), radians
+        Tilt of the upper face.
+    coatings : (lower, upper), Film or None
+    """
+
+    size: tuple[float, float]
+    gap: float
+    glass: Material
+    between: Material
+    tilt: tuple[float, float]
+    radius: float
+    thickness: float | None
+    wedge: tuple[float, float]
+    coatings: tuple[Film | None, Film | None]
+
+    __repr__ = short_repr
+
+    @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The reference face, its front in the glass, and the upper face if there is one."""
+        lower, upper = self.coatings
+        normal = layout.tilted_normal(self.tilt)
+        face = _face(self.size, self.radius).moved(turn=layout.standing_rotation(normal))
+        face, form = face.moved((0.0, 0.0, self.gap)), None
+        if math.isfinite(self.radius):
+            centre = np.array([0.0, 0.0, self.gap]) + self.radius * normal
+            form = Sphere(centre, abs(self.radius))
+        reference = Surface(face, Dielectric(film=lower), "reference", form, self.glass, self.between)
+        if self.thickness is None:
+            return (reference,)
+        wide = 4.0 * max(self.size)
+        top = plate(wide, wide).moved(turn=layout.standing_rotation(layout.tilted_normal(self.wedge)))
+        top = top.moved((0.0, 0.0, self.gap + self.thickness))
+        return reference, Surface(top, Dielectric(film=upper), "upper face", None, None, self.glass)
 
 
 def _face(size: tuple[float, float], radius: float) -> Mesh:

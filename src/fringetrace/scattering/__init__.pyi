@@ -7,7 +7,7 @@ from .detectors import (
     sides as sides,
     towards as towards,
 )
-from .far_fields import far_field as far_field
+from .far_fields import FarFieldOptions as FarFieldOptions, far_field as far_field
 from .goniometer import (
     amplitudes as amplitudes,
     brdf as brdf,

@@ -64,16 +64,38 @@ def _bands(scene: Scene, waves: FloatArray) -> list[tuple[float | None, slice]]:
     return [(float(wave), slice(i, i + 1)) for i, wave in enumerate(waves)]
 
 
+@dataclass(frozen=True)
+class FarFieldOptions:
+    """How far light is traced, and how its paths are added up; see `brdf`.
+
+    Parameters
+    ----------
+    method : {"rays", "diffraction", "power"}
+    max_bounces : int
+    min_amplitude : float
+    max_reflections : int, optional
+    half_wave_loss : bool
+    tolerance : float
+    threads : int, optional
+    """
+
+    method: str = "rays"
+    max_bounces: int = 100
+    min_amplitude: float = 1e-6
+    max_reflections: int | None = None
+    half_wave_loss: bool = True
+    tolerance: float = TOLERANCE
+    threads: int | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class _Adding:
     """How paths are added up at a detector."""
 
     lighting: Illumination
     detector: Detector
-    method: str
+    options: FarFieldOptions
     wanted: npt.NDArray[np.bool_]
-    half_wave_loss: bool
-    tolerance: float
 
     def chunk(
         self, paths: Paths, start: float, waves: FloatArray
@@ -84,14 +106,14 @@ class _Adding:
         power, count = np.zeros(self.wanted.size), np.zeros(self.wanted.size, dtype=np.int64)
         unit = 1.0 if paths.area is None else paths.area
         arrivals = self.detector.arrivals(paths, centre)
-        if self.method == "diffraction":
+        if self.options.method == "diffraction":
             arrivals = fraunhofer_paths(paths, self.detector, centre)
         since = 0.0 if isinstance(self.detector, Pixels) else start
         for i, (rows, length) in enumerate(arrivals):
             count[i], power[i] = len(rows), unit * (np.abs(paths.amplitude[rows]) ** 2).sum()
             if self.wanted.flat[i] and len(rows):
                 amplitude = self._seen(paths, rows, i)
-                total[i] = unit * spectrum(length - since, amplitude, waves, self.tolerance)
+                total[i] = unit * spectrum(length - since, amplitude, waves, self.options.tolerance)
         return total.reshape(*size, *total.shape[1:]), power.reshape(size), count.reshape(size)
 
     def _seen(self, paths: Paths, rows: npt.NDArray[np.int64], place: int) -> ComplexArray:
@@ -103,7 +125,7 @@ class _Adding:
                 for angles in np.meshgrid(self.detector.theta, self.detector.phi, indexing="ij")
             )
             amplitude = sides(towards(theta, phi), phi) @ paths.field[rows].T
-        if not self.half_wave_loss:
+        if not self.options.half_wave_loss:
             amplitude = np.where(paths.reflections[rows] % 2 == 1, -amplitude, amplitude)
         return amplitude
 
@@ -143,16 +165,10 @@ def far_field(
     phi: float,
     detector: Detector,
     wavelengths: npt.ArrayLike,
+    options: FarFieldOptions = FarFieldOptions(),
     *,
-    method: str = "rays",
     jones: npt.ArrayLike | None = None,
     chosen: npt.NDArray[np.bool_] | None = None,
-    max_bounces: int = 100,
-    min_amplitude: float = 1e-6,
-    max_reflections: int | None = None,
-    half_wave_loss: bool = True,
-    tolerance: float = TOLERANCE,
-    threads: int | None = None,
 ) -> Far:
     """Far field of one incidence: trace the sample once, sum the paths at a detector.
 
@@ -163,8 +179,7 @@ def far_field(
         Where the light comes from.
     detector : Cones, Cells or Pixels
     wavelengths : (w,) float64, metres
-    method, max_bounces, min_amplitude, max_reflections, half_wave_loss, tolerance, threads
-        See `brdf`.
+    options : FarFieldOptions
     jones : (2,) complex, optional
         Amplitudes of s and p of the light, see `Illumination.light`.
     chosen : (theta, phi) bool, optional
@@ -181,16 +196,17 @@ def far_field(
     power, count = np.zeros((*size, len(waves))), np.zeros(size, dtype=np.int64)
     shares, incident = np.zeros(len(FATES)), 0.0
     bands = _bands(lighting.scene, waves)
-    adding = _Adding(lighting, detector, method, wanted & (method != "power"), half_wave_loss, tolerance)
+    adding = _Adding(lighting, detector, options, wanted & (options.method != "power"))
     for wavelength, band in bands:
         start = lighting.start(source, wavelength)
         for paths in stream(
-            lighting.scene, source, wavelength=wavelength, max_bounces=max_bounces,
-            min_amplitude=min_amplitude, threads=threads, chunk=CHUNK,
+            lighting.scene, source, wavelength=wavelength, max_bounces=options.max_bounces,
+            min_amplitude=options.min_amplitude, threads=options.threads, chunk=CHUNK,
         ):  # fmt: skip
-            shares, incident = shares + _shares(paths), incident + paths.ledger().incident
-            most = paths if max_reflections is None else paths.where(paths.reflections <= max_reflections)
-            sums, powers, counts = adding.chunk(most, start, waves[band])
+            shares, incident, kept = shares + _shares(paths), incident + paths.ledger().incident, paths
+            if options.max_reflections is not None:
+                kept = paths.where(paths.reflections <= options.max_reflections)
+            sums, powers, counts = adding.chunk(kept, start, waves[band])
             total[..., band] += sums
             power[..., band] += powers[..., None]
             count += counts

@@ -13,7 +13,7 @@ from fringetrace.accuracy import hit_error
 from fringetrace.core import FloatArray, FringetraceWarning, array, checked_wavelengths
 from fringetrace.optics import PolarisationLike, jones_states
 from fringetrace.scattering.detectors import Cells, Cones, Detector, Pixels, checked_angles
-from fringetrace.scattering.far_fields import FATES, Far, far_field, mean
+from fringetrace.scattering.far_fields import FATES, Far, FarFieldOptions, far_field, mean
 from fringetrace.scattering.illumination import (
     Illumination,
     SourceFunction,
@@ -141,13 +141,13 @@ def amplitudes(
     theta, phi = _angles(incidence)
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
-    lighting = Illumination(scene, aperture, rays, centre, source)
+    lighting, summed = Illumination(scene, aperture, rays, centre, source), FarFieldOptions(method, **options)
     lights = jones_states(polarisation, (len(theta), len(phi)), "goniometer")
     if len(lights[0]) > 1:
         raise ValueError(f"amplitudes polarisation: expected one state of light, got {polarisation!r}")
     pairs = [(t, p) for t in theta for p in phi]
     fars = [
-        far_field(lighting, *pair, detector, waves, method=method, jones=jones, **options)
+        far_field(lighting, *pair, detector, waves, summed, jones=jones)
         for pair, (jones,) in zip(pairs, lights, strict=True)
     ]
     sums = np.reshape([far.amplitude for far in fars], (len(theta), len(phi), *fars[0].amplitude.shape))
@@ -244,7 +244,7 @@ def brdf(
     theta, phi = _angles(incidence)
     waves = checked_wavelengths(wavelengths)
     _check_method(method, detector)
-    lighting = Illumination(scene, aperture, rays, centre, source)
+    lighting, summed = Illumination(scene, aperture, rays, centre, source), FarFieldOptions(method, **options)
     if method == "diffraction":
         _check_spacing(lighting, waves)
     pairs = [(t, p) for t in theta for p in phi]
@@ -258,7 +258,7 @@ def brdf(
     for i, (t, p) in enumerate(pairs):
         chosen = order >= i if reciprocal else None
         each = [
-            far_field(lighting, t, p, detector, waves, method=method, jones=jones, chosen=chosen, **options)
+            far_field(lighting, t, p, detector, waves, summed, jones=jones, chosen=chosen)
             for jones in lights[i]
         ]
         fars.append(mean(each))

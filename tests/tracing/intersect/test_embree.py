@@ -128,7 +128,9 @@ HOW_MANY = [20_000, pytest.param(1_050_000, marks=pytest.mark.slow)]
 
 
 @pytest.mark.parametrize("bounces", HOW_MANY)
-@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize(
+    "room", [pytest.param(room, marks=pytest.mark.slow if "80k" in room else ()) for room in ROOMS]
+)
 def test_a_closed_room_keeps_every_ray_and_the_twin_agrees(room, bounces):
     build, shoot, grazes = ROOMS[room]
     rays = shoot(np.random.default_rng(1), bounces // DEPTH)
