@@ -43,8 +43,8 @@ def test_pixels_across_an_edge_cost_sampling(bench):
     assert 0.5 * edge < ft.budget(bench.trace(), HENE, "rays").sampling < 10.0 * edge
 
 
-def test_a_bench_gives_that_of_its_paths(bench, costs):
-    assert bench.budget(HENE) == costs
+def test_a_bench_gives_that_of_its_paths(bench):
+    assert bench.budget(HENE) == ft.budget(bench.trace(), HENE)
 
 
 def test_tilt_costs_pixels():
@@ -113,7 +113,7 @@ def test_what_has_no_budget(bench):
         ft.budget(ft.trace(bench.scene, bench.beam), HENE)
     with pytest.raises(ValueError, match="budget: expected paths of a Beam, got those of Rays"):
         ft.budget(ft.trace(bench.scene, rays, bench.ccd), HENE)
-    with pytest.raises(ValueError, match="method: expected 'auto', 'wavefront' or 'rays', got 'guess'"):
+    with pytest.raises(ValueError, match=r"method: expected one of .*, got 'guess'"):
         ft.budget(paths, HENE, method="guess")
     with pytest.raises(ValueError, match="wavelength: expected a positive length"):
         ft.budget(paths, -HENE)

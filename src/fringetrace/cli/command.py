@@ -206,13 +206,15 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
             few = aside.submit(bench.sampled, viewer.few(bench.beam.shape))
             scene = aside.submit(_draw, bench, few.result, folder)
             few.result()  # before the trace, which needs the same trees
-        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre)
         with _progress("tracing") as advance:
             start = time.perf_counter()
             bench.trace(progress=advance, threads=settings.threads)
             seconds = time.perf_counter() - start
         choice = choose(bench.trace(), bench.method)
         _say(console, "method", str(choice))
+        # what is averaged over pixels is compared with a mean
+        parts = 1 if choice.method == "rays" else 2
+        truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre, parts)
         costing = aside.submit(checks.judge, bench.trace(), wavelength, choice.method)
         measured = measurement.measure_height(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)

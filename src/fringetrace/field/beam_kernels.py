@@ -68,7 +68,7 @@ class Facets(NamedTuple):
     roots: Array
 
 
-class Limits(NamedTuple):
+class Tolerances(NamedTuple):
     """Least area (m^2) of a beam; what sides may overlap by rounding, and facets lie apart by it (m)."""
 
     area: float
@@ -76,7 +76,7 @@ class Limits(NamedTuple):
     gap: float
 
 
-class Optics(NamedTuple):
+class Interfaces(NamedTuple):
     """Amplitudes (surfaces,) of both branches, base of path keys, most bounces, least squared amplitude."""
 
     reflection: Array
@@ -95,7 +95,7 @@ class Beams(NamedTuple):
     amplitude: Array
 
 
-class Footprints(NamedTuple):
+class FootprintTables(NamedTuple):
     """Beams on the CCD: corners (pixels), where those of each end, waves, keys."""
 
     corners: Array
@@ -558,9 +558,9 @@ def roomy(beams, waiting, out, done):
             grown(beams.frame), grown_polygons(beams.polygon), grown(beams.state), grown(beams.amplitude)
         )
     while done > len(out.key):
-        out = Footprints(out.corners, grown(out.end), grown(out.wave), grown(out.key))
+        out = FootprintTables(out.corners, grown(out.end), grown(out.wave), grown(out.key))
     while CORNERS * done > len(out.corners):
-        out = Footprints(grown(out.corners), out.end, out.wave, out.key)
+        out = FootprintTables(grown(out.corners), out.end, out.wave, out.key)
     return beams, out
 
 
@@ -582,7 +582,7 @@ def follow(source, section, leaf, facets, optics, limits, screen, pitch, shape):
     beams = Beams(
         np.empty((64, FRAME)), np.empty((64, CORNERS, 2)), np.empty((64, 4), np.int64), np.empty((64, 2))
     )
-    out = Footprints(
+    out = FootprintTables(
         np.empty((1024, 2)), np.empty((256, 1), np.int64), np.empty((256, WAVE)), np.empty((256, 1), np.int64)
     )
     for k in range(3):

@@ -109,14 +109,20 @@ def follow_beam(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int, min_amplit
     Footprints
         The same for any number of threads.
     """
-    facets = facet_tables(scene)
     reflection, transmission = constants(scene)
     base = 2 * len(scene.surfaces) + 1
-    optics = kernels.Optics(reflection, transmission, base, max_bounces, min_amplitude**2)
+    optics = kernels.Interfaces(reflection, transmission, base, max_bounces, min_amplitude**2)
+    return _joined(*_followed(scene, beam, ccd, optics))
+
+
+def _followed(
+    scene: Scene, beam: Beam, ccd: CCD, optics: kernels.Interfaces
+) -> tuple[list[list[Array]], FloatArray]:
+    """Tables of footprints (corners, ends, waves, keys) for parts of the source, and the power."""
+    facets = facet_tables(scene)
     size = float(np.nanmax(np.abs(facets.corners.reshape(-1, 3) - beam.centre)))
-    limits = kernels.Limits(
-        SLIVER * ccd.pitch**2, max(SAME_IN_PIXEL * ccd.pitch, SAME_IN_SCENE * size), SAME_IN_SCENE * size
-    )
+    slack = max(SAME_IN_PIXEL * ccd.pitch, SAME_IN_SCENE * size)
+    limits = kernels.Tolerances(SLIVER * ccd.pitch**2, slack, SAME_IN_SCENE * size)
     source = np.concatenate([beam.centre, *beam.axes, np.zeros(4)])
     width, height = beam.size
     count = sum(len(surface.mesh.faces) for surface in scene.surfaces)
@@ -134,7 +140,7 @@ def follow_beam(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int, min_amplit
 
     with ThreadPoolExecutor(os.cpu_count() or 1, thread_name_prefix="fringetrace") as pool:
         tables, powers = zip(*pool.map(part, range(len(edges) - 1)), strict=True)
-    return _joined(list(tables), np.sum(powers, axis=0))
+    return list(tables), np.sum(powers, axis=0)
 
 
 def _joined(tables: list[list[Array]], power: FloatArray) -> Footprints:

@@ -89,12 +89,12 @@ def choose(paths: Paths, method: str = "auto") -> Choice:
         raise ValueError(f"method: expected 'wavefront' or 'rays' with {why}, got 'facets'")
     pixels = 0 if paths.ccd is None else math.prod(paths.ccd.shape)
     faces = sum(len(surface.mesh.faces) for surface in paths.scene.surfaces)
-    rays = math.prod(paths.source.shape) if isinstance(paths.source, Beam) else len(paths)
+    rays = math.prod(paths.source.shape) if isinstance(paths.source, Beam) else 0
     asked = "asked for" if method != "auto" else None
     if method == "facets" or (method == "auto" and why is None):
         return Choice("facets", asked or f"exact for {faces:,} flat facets", faces * FACET + pixels * PIXEL)
-    summed = Choice("rays", asked or (f"{tears} tears waves" if tears else f"{why}"), rays * RAY)
-    if method == "rays" or tears or not isinstance(paths.source, Beam) or paths.ccd is None:
+    summed = Choice("rays", asked or (f"{tears} tears waves" if tears else f"{why}"), len(paths) * RAY)
+    if method == "rays" or (method == "auto" and (tears or rays == 0 or pixels == 0)):
         return summed
     waves = _flat_facets(paths.scene, max(FEW, rays // SHARING))
     seconds = waves * rays * WAVE + pixels * PIXEL

@@ -53,7 +53,7 @@ from fringetrace.tracing.kernels_rays import (
     write_vector,
 )
 from fringetrace.tracing.optics_table import BOUNDARY, CONSTANT, SurfaceTable
-from fringetrace.tracing.plan import Limits
+from fringetrace.tracing.plan import TraceLimits
 
 
 @jit
@@ -137,7 +137,7 @@ def interact(
     # not taken apart further: numba counts references to arrays that are handed to other functions in
     # loops and branches, 100 ns a ray
     batch, ends = Batch(*batch_columns), Ends(*end_columns)
-    surfaces, limits = SurfaceTable(*surface_columns), Limits(*limit_columns)
+    surfaces, limits = SurfaceTable(*surface_columns), TraceLimits(*limit_columns)
     state, last, came, crossed = batch.state, batch.last, batch.came, batch.crossed
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
@@ -320,7 +320,7 @@ def rebound(
 
     Returns how many rays go on, how many have ended, and how many hits were doubtful.
     """
-    batch, ends, limits = Batch(*batch_columns), Ends(*end_columns), Limits(*limit_columns)
+    batch, ends, limits = Batch(*batch_columns), Ends(*end_columns), TraceLimits(*limit_columns)
     key, ray, state, last, came = batch.key, batch.ray, batch.state, batch.last, batch.came
     end_key, end_ray, end_bounces = ends.key, ends.ray, ends.bounces
     origin, direction, length, end_fate = ends.origin, ends.direction, ends.length, ends.fate

@@ -61,7 +61,7 @@ class SurfaceTable(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Optics:
+class SceneOptics:
     """What light meets in a scene.
 
     Attributes
@@ -157,7 +157,7 @@ def needs(scene: Scene) -> str | None:
     return None
 
 
-def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
+def optics(scene: Scene, wavelength: float | None, polarised: bool) -> SceneOptics:
     """The media, boundaries and elements of a scene at a wavelength.
 
     Parameters
@@ -169,7 +169,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
 
     Returns
     -------
-    Optics
+    SceneOptics
 
     Raises
     ------
@@ -191,7 +191,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
     table = _table(scene, 1.0 if wavelength is None else wavelength, vacuum)
     if wavelength is not None:
         table = table._replace(k0=2.0 * math.pi / wavelength)
-    return Optics(table, vacuum, None if vacuum else wavelength, polarised, elements)
+    return SceneOptics(table, vacuum, None if vacuum else wavelength, polarised, elements)
 
 
 def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:

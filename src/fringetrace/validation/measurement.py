@@ -99,9 +99,13 @@ class Measurement:
 
 
 def heights(
-    mesh: Mesh, shape: tuple[int, int], pitch: float, centre: npt.ArrayLike = (0.0, 0.0, 0.0)
+    mesh: Mesh,
+    shape: tuple[int, int],
+    pitch: float,
+    centre: npt.ArrayLike = (0.0, 0.0, 0.0),
+    parts: int = 1,
 ) -> FloatArray:
-    """Heights of a mesh at pixel centres.
+    """Heights of a mesh at pixels, in their centres or as means.
 
     Parameters
     ----------
@@ -110,20 +114,24 @@ def heights(
     pitch : float, metres
     centre : (3,) array-like, metres
         The point that is in the middle of the image, and at height 0.
+    parts : int
+        The mean of the heights at the centres of parts x parts parts of each pixel.
 
     Returns
     -------
     (rows, columns) float64, metres
-        NaN where there is no mesh.
+        NaN where there is no mesh, or not in all of a pixel's parts.
     """
-    x, y = pixel_centres(shape, pitch)
+    rows, columns = shape
+    x, y = pixel_centres((rows * parts, columns * parts), pitch / parts)
     x0, y0, z0 = np.asarray(centre, dtype=np.float64)
-    return np.asarray(interpolate_height(mesh, x[None, :] + x0, y[:, None] + y0) - z0)
+    fine = np.asarray(interpolate_height(mesh, x[None, :] + x0, y[:, None] + y0) - z0, dtype=np.float64)
+    return np.asarray(fine.reshape(rows, parts, columns, parts).mean(axis=(1, 3)), dtype=np.float64)
 
 
 def _smooth(truth: FloatArray, limit: float, bend: float) -> Array:
     """Where heights change by less than `limit` to all neighbours and evenly; steps and rims are left out."""
-    padded = np.pad(truth, 1, mode="edge")
+    padded = np.pad(truth, 1, mode="reflect", reflect_type="odd")  # even beyond the rim
     middle = padded[1:-1, 1:-1]
     pairs = ((padded[:-2, 1:-1], padded[2:, 1:-1]), (padded[1:-1, :-2], padded[1:-1, 2:]))
     with np.errstate(invalid="ignore"):
