@@ -214,6 +214,28 @@ def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:
     )
 
 
+def sides(scene: Scene) -> npt.NDArray[np.int32]:
+    """The media beside each surface.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    (surfaces, 2) int32
+        Numbers of the media in front and behind, see `scene_media`; -1 for surfaces that part none, -2 if
+        they let no light through either.
+    """
+    numbers = {medium: number for number, medium in enumerate(scene_media(scene))}
+    opaque = constants(scene)[1] == 0.0
+    table = np.repeat(np.where(opaque, -2, -1)[:, None], 2, axis=1).astype(np.int32)
+    for number, surface in enumerate(scene.surfaces):
+        if surface.boundary:
+            table[number] = [numbers[side or scene.around] for side in (surface.front, surface.back)]
+    return table
+
+
 def _index(medium: Material, wavelength: float) -> complex:
     """Index of a medium that the kernels can do with."""
     index, (least, most) = complex(medium.index(wavelength)), INDICES
