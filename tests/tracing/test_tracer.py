@@ -14,6 +14,9 @@ from fringetrace.core.vectors import rotation
 from fringetrace.geometry import shapes
 from fringetrace.tracing.detection import project
 
+# Rays are cut off on purpose: what becomes of them is looked at here, that it is warned of in `test_checks`.
+pytestmark = pytest.mark.filterwarnings("ignore:power is cut off")
+
 # A dozen roundings: a path is a sum of a few segments.
 ROUNDING = 1e-14
 LEDGER = 1e-12
