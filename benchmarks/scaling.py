@@ -40,37 +40,44 @@ def coin(count: int, relief: float = 1e-6, width: float = 12e-3) -> tuple[np.nda
     return np.stack([x, y, z], axis=-1).reshape(-1, 3), faces
 
 
-def measured(count: int) -> dict[str, float]:
-    """Seconds of each part of the work, and its memory, in this process."""
-    import trimesh
-
+def measured(path: str) -> dict[str, float]:
+    """Seconds of each part of the work on a file, and its memory, in this process."""
     import fringetrace as ft
     from fringetrace.cli import command
 
     laps: dict[str, float] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "coin.stl"
-        vertices, faces = coin(count)
-        trimesh.Trimesh(1e3 * vertices, faces, process=False).export(path)
-        start = time.process_time()
+    start = time.process_time()
 
-        def lap(what: str) -> None:
-            nonlocal start
-            laps[what], start = time.process_time() - start, time.process_time()
+    def lap(what: str) -> None:
+        nonlocal start
+        laps[what], start = time.process_time() - start, time.process_time()
 
-        mesh = ft.meshes.load(path, unit="mm")
-        bench, _ = command._bench(mesh, None, HENE, command.Settings())
-        lap("load")
-        paths = bench.trace()
-        lap("trace")
-        ft.field.reconstruct_facet_waves(paths)
-        lap("waves")
-        bench.phase_steps(HENE)
-        lap("frames")
-        bench.budget(HENE)
-        lap("budget")
+    mesh = ft.meshes.load(path, unit="mm")
+    bench, _ = command._bench(mesh, None, HENE, command.Settings())
+    lap("load")
+    paths = bench.trace()
+    lap("trace")
+    ft.field.reconstruct_facet_waves(paths)
+    lap("waves")
+    bench.phase_steps(HENE)
+    lap("frames")
+    bench.budget(HENE)
+    lap("budget")
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
-    return {"triangles": len(faces), **laps, "memory": memory}
+    return {"triangles": len(mesh.faces), **laps, "memory": memory}
+
+
+def apart(count: int, folder: str) -> dict[str, float]:
+    """`measured` for a size, in a process of its own."""
+    import trimesh
+
+    path = Path(folder) / "coin.stl"
+    vertices, faces = coin(count)
+    trimesh.Trimesh(1e3 * vertices, faces, process=False).export(path)
+    command = [sys.executable, __file__, "--one", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    found: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
 def table(rows: list[dict[str, float]]) -> str:
@@ -105,19 +112,18 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--most", type=float, default=2.1e6, help="triangles, at most")
     options.add_argument("--write", action="store_true", help="put table and plot into the docs")
-    options.add_argument("--one", type=int, help=argparse.SUPPRESS)
+    options.add_argument("--one", help=argparse.SUPPRESS)
     given = options.parse_args()
     if given.one:
         print(json.dumps(measured(given.one)))
         return
     rows = []
-    measured(10)  # compiles
-    for count in SIZES:
-        if 0.5 * np.pi * count**2 <= given.most:
-            command = [sys.executable, __file__, "--one", str(count)]
-            done = subprocess.run(command, capture_output=True, text=True, check=True)
-            rows.append(json.loads(done.stdout.splitlines()[-1]))
-            print(table(rows[-1:]).splitlines()[-1], flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        apart(SIZES[0], folder)  # compiles
+        for count in SIZES:
+            if 0.5 * np.pi * count**2 <= given.most:
+                rows.append(apart(count, folder))
+                print(table(rows[-1:]).splitlines()[-1], flush=True)
     print(table(rows))
     if given.write:
         sys.path.insert(0, str(DOCS / "figures"))

@@ -133,7 +133,11 @@ def shut(side: int) -> Skip:
 def only_mirrors(side: int) -> Skip:
     """One real pass over the rays a bounce, without amplitudes."""
     work = tracing(*rods(side))
-    general = without(work, "_plan", lambda plan: lambda *a: replace(plan(*a), plain=False), "tracing.tracer")
+
+    def general() -> list[np.ndarray]:
+        with patch("fringetrace.tracing.plan.Plan.mirrors", False):
+            return work()
+
     return Skip("only ideal mirrors: no amplitudes, one pass a bounce", "80 rods in a box", work, general)
 
 
@@ -209,10 +213,10 @@ def dropped(side: int) -> Skip:
             if not (batch.bounces[:rows] == 0).all():
                 finished = first[0] - rows
                 if finished:
-                    idle = part(first[1], 0, finished)
+                    idle = part(first[1], slice(0, finished))
                     find(engine, idle, finished, type(hits).blank(finished), passed)
             else:
-                kept = {name: column[:rows].copy() for name, column in vars(batch).items()}
+                kept = {name: column[:rows].copy() for name, column in batch._asdict().items()}
                 first[:] = [rows, type(batch)(**kept)]
             return find(engine, batch, rows, hits, passed)
 

@@ -160,8 +160,19 @@ def test_light_goes_the_same_way_back(seed):
     middle = 0.5 * (there.points[:, 11] + there.points[:, 12])
     back = ft.trace(room, ft.Rays(middle, unit(there.points[:, 11] - middle)), max_bounces=11, record=True)
     assert np.array_equal(back.triangle, there.triangle[:, 10::-1])
-    np.testing.assert_allclose(back.points[:, 1:12], there.points[:, 11:0:-1], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(back.direction, -direction, rtol=0, atol=1e-11)
+    # each bounce turns a ray by a rounding, and so do the points that the start is taken from, the more the
+    # nearer they are; over the whole way this moves hits, at grazing incidence most
+    corners = room.surfaces[0].mesh.vertices[room.surfaces[0].mesh.faces[there.triangle]]
+    normal = unit(np.cross(corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]))
+    steps = np.diff(there.points[:, :13], axis=1)
+    cosine = np.abs((steps * normal).sum(axis=2)) / np.linalg.norm(steps, axis=2)
+    turned = 12 * EPS + EPS * np.nanmax(np.abs(there.points)) / np.linalg.norm(
+        middle - there.points[:, 11], axis=1
+    )
+    moved = 2 * turned * np.linalg.norm(steps, axis=2).sum(axis=1) / cosine.min(axis=1)
+    apart = np.abs(back.points[:, 1:12] - there.points[:, 11:0:-1]).max(axis=(1, 2))
+    assert (apart <= moved).all()
+    assert (np.abs(back.direction + direction).max(axis=1) <= 2 * turned).all()
     last = np.linalg.norm(start - there.points[:, 1], axis=1)
     half = np.linalg.norm(there.points[:, 12] - middle, axis=1)
     np.testing.assert_allclose(back.length + last + half, there.length, rtol=1e-11)

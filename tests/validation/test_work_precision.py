@@ -154,15 +154,16 @@ def test_a_quick_bench_runs_each_method_that_suits():
 # The scripts that write docs/accuracy.md.
 
 
-def test_sections_are_written_each_on_its_own(tmp_path):
+def test_sections_are_written_each_on_its_own(tmp_path, monkeypatch):
+    monkeypatch.setattr(pages, "provenance", lambda: "here, today")
     page = tmp_path / "page.md"
     page.write_text("# Page\n\n<!-- one -->\n\nold\n\n<!-- end of one -->\n\nby hand\n")
     pages.write("one", "new\n", page)
     pages.write("two", "more", page)
     pages.write("two", "other", page)
     assert page.read_text() == (
-        "# Page\n\n<!-- one -->\n\nnew\n\n<!-- end of one -->\n\nby hand\n\n"
-        "<!-- two -->\n\nother\n\n<!-- end of two -->\n"
+        "# Page\n\n<!-- one -->\n\nnew\n\n*Made here, today*\n\n<!-- end of one -->\n\nby hand\n\n"
+        "<!-- two -->\n\nother\n\n*Made here, today*\n\n<!-- end of two -->\n"
     )
     assert [file.name for file in tmp_path.iterdir()] == ["page.md"]
 

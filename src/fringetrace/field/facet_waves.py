@@ -12,7 +12,7 @@ from threading import Lock
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelength
+from fringetrace.core import Array, ComplexArray, FloatArray, checked_wavelength
 from fringetrace.field import footprint_kernels as kernels
 from fringetrace.field.beam_tracing import Footprints, follow_beam
 from fringetrace.field.groups import grouped
@@ -313,7 +313,7 @@ def _profiled(waves: FacetWaves, beams: list[Beam], owner: npt.NDArray[np.int64]
     if all(profile is None for profile in profiles):
         return waves
     prints, count = waves.footprints, len(waves.member)
-    middle, at = np.empty((count, 5)), np.empty((count, 4, 2))
+    middle, at = np.empty((count, 5)), np.empty((count, 5, 2))
     kernels.sources(
         waves.ccd.shape[1], prints.corners, prints.first, waves.begin, waves.member, prints.wave, middle, at
     )
@@ -321,7 +321,7 @@ def _profiled(waves: FacetWaves, beams: list[Beam], owner: npt.NDArray[np.int64]
     for number, profile in enumerate(profiles):
         mine = np.flatnonzero(owner[waves.member] == number)
         if profile is not None:
-            values = np.broadcast_to(profile(*at[mine].reshape(-1, 2).T), 4 * len(mine)).reshape(-1, 4)
+            values = np.broadcast_to(profile(*at[mine].reshape(-1, 2).T), 5 * len(mine)).reshape(-1, 5)
             table[mine] = _linear(values, middle[mine])
     return replace(waves, profile=table)
 
@@ -331,7 +331,7 @@ def _linear(values: FloatArray, middle: FloatArray) -> FloatArray:
 
     Parameters
     ----------
-    values : (m, 4)
+    values : (m, 5)
         At the points of `kernels.sources`.
     middle : (m, 5) float64
         As there.
@@ -341,13 +341,19 @@ def _linear(values: FloatArray, middle: FloatArray) -> FloatArray:
     (m, 5) float64
         Real and imaginary part, gradient a pixel along x and y, and its product with the centroid.
     """
-    mean, power = values.mean(axis=1), (np.abs(values) ** 2).mean(axis=1)
+    mean, power = _mean(values), np.maximum(_mean(np.abs(values) ** 2).real, 0.0)
     amplitude = np.exp(1j * np.angle(mean)) * np.sqrt(power)
     x, y, along, shear, up = middle.T
     some = (along > 0.0) & (up > 0.0) & (mean != 0.0)
     change = np.divide(
-        values[:, ::2] - values[:, 1::2], 2.0 * mean[:, None], where=some[:, None], out=0.0 * values[:, :2]
+        values[:, :4:2] - values[:, 1:4:2], 2.0 * mean[:, None], where=some[:, None], out=0.0 * values[:, :2]
     )
     rise = np.divide(change[:, 1].real, up, where=some, out=np.zeros(len(up)))
     run = np.divide(change[:, 0].real - shear * rise, along, where=some, out=np.zeros(len(up)))
     return np.stack([amplitude.real, amplitude.imag, run, rise, run * x + rise * y], axis=1)
+
+
+def _mean(values: Array) -> Array:
+    """Means of functions over parts of pixels, to the second order, from their values (m, 5) there."""
+    middle = values[:, 4]
+    return np.asarray(middle + (values[:, :4].mean(axis=1) - middle) / kernels.WITHIN**2)

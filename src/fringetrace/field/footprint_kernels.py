@@ -34,7 +34,7 @@ from fringetrace.field.polygon_kernels import (
 
 # A smaller part of a pixel is rounding; one that misses no more fills it.
 NONE, ALL = 1e-12, 1.0 - 1e-9
-# Points stand for a part of a pixel this much nearer its middle than they should: inside a triangle.
+# Points are this much nearer the middle than those that stand for a triangle, which lie on its sides.
 WITHIN = 0.9
 # Step of a slope (radians a pixel) for a derivative: its square, times 1e-2, is what it misses.
 STEP = 1e-3
@@ -112,11 +112,11 @@ def moments(polygon, corners):
 
 @jit
 def sources(columns, corners, first, begin, members, waves, middle, at):
-    """Four points of the part of a pixel that each member lights, and where in the source they come from.
+    """Points of the part of a pixel that each member lights, and where in the source they come from.
 
-    They have the mean and the variances of the part: `middle` (members, 5) its centroid about the pixel's
-    centre, and along, shear, up: the points lie by (along, shear) and by (0, up) to either side of it;
-    `at` (members, 4, 2) is s, t.
+    `middle` (members, 5) is its centroid about the pixel's centre, and along, shear, up: four points lie by
+    (along, shear) and by (0, up) to either side of it, the last in it; `at` (members, 5, 2) is s, t. Farther
+    out by 1 / `WITHIN` the four would have the variances of the part.
     """
     polygon, spare, square = np.empty((CORNERS, 2)), np.empty((CORNERS, 2)), pixel_sides()
     for pixel in range(len(begin) - 1):
@@ -130,8 +130,8 @@ def sources(columns, corners, first, begin, members, waves, middle, at):
             shear = 2.0 * xy * WITHIN**2 / along if along > 0.0 else 0.0
             up = np.sqrt(max(2.0 * yy * WITHIN**2 - shear * shear, 0.0))
             middle[k, 0], middle[k, 1], middle[k, 2], middle[k, 3], middle[k, 4] = cx, cy, along, shear, up
-            for j in range(4):
-                sign = 1.0 - 2.0 * (j % 2)
+            for j in range(5):
+                sign = 1.0 - 2.0 * (j % 2) if j < 4 else 0.0
                 u = x + cx + (sign * along if j < 2 else 0.0) - waves[n, X]
                 v = y + cy + (sign * shear if j < 2 else sign * up) - waves[n, Y]
                 at[k, j, 0] = waves[n, S] + waves[n, DERIVATIVES] * u + waves[n, DERIVATIVES + 1] * v

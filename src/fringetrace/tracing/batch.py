@@ -32,7 +32,9 @@ class Batch(NamedTuple):
     last : (n,) int64
         Triangle last left; -1: none.
     came : (n, 3) float64
-        Direction of the last segment that was longer than 0.
+        Direction of the last segment that was longer than 0; 0: none was.
+    crossed : (n, 16) int32
+        The triangles that it went through where it stands, see `intersect.coincident`.
     """
 
     key: npt.NDArray[np.uint64]
@@ -45,6 +47,7 @@ class Batch(NamedTuple):
     state: FloatArray
     last: npt.NDArray[np.int64]
     came: FloatArray
+    crossed: npt.NDArray[np.int32]
 
 
 class Ends(NamedTuple):
@@ -98,8 +101,9 @@ Table = TypeVar("Table", Batch, Ends, Light)
 TYPES = {
     "amplitude": np.complex128, "field": np.complex128, "key": np.uint64, "ray": np.int64, "last": np.int64,
     "serial": np.int64, "bounces": np.int32, "reflections": np.int32, "medium": np.int32, "fate": np.int8,
+    "crossed": np.int32,
 }  # fmt: skip
-WIDTHS = {"origin": 3, "direction": 3, "came": 3, "fade": 3, "field": 3, "state": 12}
+WIDTHS = {"origin": 3, "direction": 3, "came": 3, "fade": 3, "field": 3, "state": 12, "crossed": 16}
 
 
 def blank(kind: type[Table], rows: int, **widths: int) -> Table:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fringetrace.core import Array, ComplexArray, FloatArray
-from fringetrace.tracing.batch import copy_rows
+from fringetrace.core import Array, ComplexArray, FloatArray, dot
+from fringetrace.tracing.batch import Batch, copy_rows
 from fringetrace.tracing.fates import ABSORBED, ALIVE, FAINT
 
 if TYPE_CHECKING:
@@ -93,6 +93,16 @@ def _cloned(space: Workspace, rows: Array) -> Array:
     return to
 
 
+def _turn(batch: Batch, rows: Array, direction: FloatArray) -> None:
+    """Let rows go on in other directions; those that turn back have not gone through what they met."""
+    from fringetrace.tracing.intersect.coincident import turned_back
+
+    normal = batch.state[rows, 6:9]
+    ahead, now = dot(batch.state[rows, 3:6], normal) > 0.0, dot(direction, normal) > 0.0
+    turned_back(batch.crossed, rows[ahead != now], batch.last)
+    batch.state[rows, 3:6] = direction
+
+
 def _write(plan: Plan, space: Workspace, rows: Array, branch: Branch, record: Record | None) -> None:
     """Let rows go on as a branch says, row by row."""
     batch, light, field = space.batch, space.light, branch.field
@@ -104,7 +114,7 @@ def _write(plan: Plan, space: Workspace, rows: Array, branch: Branch, record: Re
     else:
         batch.amplitude[rows] = field
     if branch.direction is not None:
-        batch.state[rows, 3:6] = branch.direction
+        _turn(batch, rows, branch.direction)
     if branch.point is not None:
         batch.state[rows, :3] = branch.point
     if branch.path is not None:

@@ -16,6 +16,7 @@ from fringetrace.core import jit
 from fringetrace.optics import bare, coated
 from fringetrace.tracing.batch import Batch, Ends, Light
 from fringetrace.tracing.fates import ABSORBED, ALIVE, FAINT
+from fringetrace.tracing.intersect.coincident import BACK, COUNT, FIRST, hand_on
 from fringetrace.tracing.intersect.kernels import (  # fmt: skip
     EDGE,
     LEAVING,
@@ -39,7 +40,7 @@ from fringetrace.tracing.kernels_boundary import (
     strength,
 )
 from fringetrace.tracing.kernels_rays import (
-    fated,
+    fate_ahead,
     latest,
     read_hit,
     read_ray,
@@ -52,7 +53,7 @@ from fringetrace.tracing.kernels_rays import (
     write_vector,
 )
 from fringetrace.tracing.optics_table import BOUNDARY, CONSTANT, SurfaceTable
-from fringetrace.tracing.plan import Limits
+from fringetrace.tracing.plan import TraceLimits
 
 
 @jit
@@ -62,7 +63,7 @@ def compact(batch_columns, light_columns, start, stop, to, why, end_columns, end
     `why` is what becomes of each. Returns how many rows of the batch and of the ends are filled.
     """
     batch, ends = Batch(*batch_columns), Ends(*end_columns)
-    state, last, came = batch.state, batch.last, batch.came
+    state, last, came, crossed = batch.state, batch.last, batch.came, batch.crossed
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
     origin, direction, length, fate = ends.origin, ends.direction, ends.length, ends.fate
@@ -100,6 +101,8 @@ def compact(batch_columns, light_columns, start, stop, to, why, end_columns, end
         if to < row:
             for k in range(state.shape[1]):
                 state[to, k] = state[row, k]
+            for k in range(FIRST + crossed[row, COUNT]):
+                crossed[to, k] = crossed[row, k]
             write_last(last, came, to, last[row], came[row, 0], came[row, 1], came[row, 2])
             write_path(key, ray, bounces, serial, to, here, number, steps, name)
             write_power(lost, amplitude, reflections, to, gone, value, mirrored)
@@ -134,8 +137,9 @@ def interact(
     # not taken apart further: numba counts references to arrays that are handed to other functions in
     # loops and branches, 100 ns a ray
     batch, ends = Batch(*batch_columns), Ends(*end_columns)
-    surfaces, limits = SurfaceTable(*surface_columns), Limits(*limit_columns)
-    state, last, came = batch.state, batch.last, batch.came
+    surfaces, limits = SurfaceTable(*surface_columns), TraceLimits(*limit_columns)
+    screen, has_screen, most = limits.screen, limits.has_screen, limits.max_bounces
+    state, last, came, crossed = batch.state, batch.last, batch.came, batch.crossed
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
     end_origin, end_direction, end_length, end_fate = ends.origin, ends.direction, ends.length, ends.fate
@@ -168,8 +172,8 @@ def interact(
                     field = 0j, fields[row, 0], fields[row, 1], fields[row, 2]
             else:
                 field = value, 0j, 0j, 0j
-        k = triangle[row]
-        fate, reach = fated(limits, steps, k >= 0, path, x, y, z, dx, dy, dz)
+        k, gone_through = triangle[row], False
+        fate, reach = fate_ahead(screen, has_screen, most, steps, k >= 0, path, x, y, z, dx, dy, dz)
         step = path if fate == ALIVE else reach
         if light_columns is None:
             way += step
@@ -240,6 +244,10 @@ def interact(
                             write_vector(fields, new, through[1], through[2], through[3])
                     write_ray(state, new, x, y, z, t[0], t[1], t[2], nx, ny, nz, way, rim)
                     write_last(last, came, new, k, bx, by, bz)
+                    if path > 0.0:
+                        crossed[new, COUNT], crossed[new, BACK], crossed[new, FIRST] = 1, 0, k
+                    else:
+                        hand_on(crossed, row, new, k)
                     write_path(
                         key, ray, bounces, serial, new, here + np.uint64(1), number, steps, serials + born
                     )
@@ -252,7 +260,7 @@ def interact(
                     f = f[0] - 2.0 * fade * nx, f[1] - 2.0 * fade * ny, f[2] - 2.0 * fade * nz
                 fate = FAINT if returns < faint else ALIVE
             elif passes > 0.0:
-                here += np.uint64(1)
+                here, gone_through = here + np.uint64(1), True
                 (dx, dy, dz), field = t, through
                 if light_columns is not None:
                     inside, index, f = beyond, beside, u
@@ -261,6 +269,10 @@ def interact(
                 field, fate = (0j, 0j, 0j, 0j), ABSORBED
             value = strength(field, polarised)
         if fate == ALIVE:
+            if path > 0.0:
+                crossed[kept, COUNT], crossed[kept, BACK], crossed[kept, FIRST] = gone_through, 0, k
+            else:
+                hand_on(crossed, row, kept, k if gone_through else -1)
             write_ray(state, kept, x, y, z, dx, dy, dz, nx, ny, nz, way, rim)
             write_last(last, came, kept, k, bx, by, bz)
             write_path(key, ray, bounces, serial, kept, here, number, steps, name)
@@ -300,7 +312,8 @@ def interact(
 
 @jit
 def rebound(
-    count, steps, prim, batch_columns, body, digit, limit_columns, end_columns, first, origin32, direction32
+    count, steps, prim, batch_columns, contact, body, digit, limit_columns, end_columns, first, origin32,
+    direction32,
 ):  # fmt: skip
     """`measure`, `interact` and `aim` in one, for a single body of ideal mirrors that all rays just left.
 
@@ -308,13 +321,14 @@ def rebound(
 
     Returns how many rays go on, how many have ended, and how many hits were doubtful.
     """
-    batch, ends, limits = Batch(*batch_columns), Ends(*end_columns), Limits(*limit_columns)
+    batch, ends, limits = Batch(*batch_columns), Ends(*end_columns), TraceLimits(*limit_columns)
+    screen, has_screen, most = limits.screen, limits.has_screen, limits.max_bounces
     key, ray, state, last, came = batch.key, batch.ray, batch.state, batch.last, batch.came
     end_key, end_ray, end_bounces = ends.key, ends.ray, ends.bounces
     origin, direction, length, end_fate = ends.origin, ends.direction, ends.length, ends.fate
-    _, _, oriented, closed, frame, planes, _, _ = body
+    _, _, oriented, closed, frame, planes, _, crowd, _ = body
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
-    unscale, margin = 1.0 / scale, frame[5]
+    unscale, margin, crowds = 1.0 / scale, frame[5], len(crowd) > 0
     base = np.uint64(limits.key_base)
     kept, ended, doubtful = 0, 0, 0
     many = base > np.uint64(3)  # else there is one surface, and one digit
@@ -328,11 +342,11 @@ def rebound(
             k = np.uintp(guess)
             facing, inverted, path, px, py, pz, rim = crossing(planes, k, x, y, z, dx, dy, dz)
         doubt = unsure(guess, guess == last[row], path, facing, True, leaving, closed)
-        if doubt or rim <= MARGIN or edge < margin:
-            unclear, guess, (path, px, py, pz, rim) = reviewed(
+        if doubt or rim <= MARGIN or edge < margin or crowds:
+            unclear, guess, (path, px, py, pz, rim), _ = reviewed(
                 (x, y, z, dx, dy, dz), (came[row, 0], came[row, 1], came[row, 2]),
                 (state[row, NX], state[row, NY], state[row, NZ]), last[row], leaving, edge, guess, facing,
-                (path, px, py, pz, rim), doubt, body,
+                (path, px, py, pz, rim), doubt, row, contact, body,
             )  # fmt: skip
             doubtful += unclear
             if guess >= 0:
@@ -340,7 +354,7 @@ def rebound(
                 facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
                 inverted = 1.0 / facing
         path = path * unscale if guess >= 0 else np.inf
-        fate, reach = fated(limits, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz)
+        fate, reach = fate_ahead(screen, has_screen, most, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz)
         if fate != ALIVE:
             end = ray[row] - first
             end_key[end], end_ray[end], end_bounces[end] = key[row], ray[row], steps
@@ -348,7 +362,7 @@ def rebound(
             write_end(origin, direction, length, end_fate, end, gx, gy, gz, dx, dy, dz, way, fate)
             ended += 1
             continue
-        if not oriented:  # nobody else asks from where a ray came
+        if not oriented or crowds:  # nobody else asks from where a ray came
             came[kept, 0], came[kept, 1], came[kept, 2] = latest(
                 path, dx, dy, dz, came[row, 0], came[row, 1], came[row, 2]
             )

@@ -8,6 +8,7 @@ from fringetrace.core import jit, part
 from fringetrace.scene import lands
 from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.fates import ALIVE, DETECTED, LEFT, TRUNCATED
+from fringetrace.tracing.intersect.coincident import BACK, COUNT
 from fringetrace.tracing.intersect.kernels import (  # fmt: skip
     DX,
     DY,
@@ -115,28 +116,29 @@ def latest(path, dx, dy, dz, bx, by, bz):
 
 
 @part
-def fated(limits, steps, meets, path, x, y, z, dx, dy, dz):
+def fate_ahead(screen, has_screen, max_bounces, steps, meets, path, x, y, z, dx, dy, dz):
     """What becomes of a ray before it meets a face `path` metres ahead (if any), and its path to the CCD."""
-    if limits.has_screen:
-        reach = lands(limits.screen, path, x, y, z, dx, dy, dz)
+    if has_screen:
+        reach = lands(screen, path, x, y, z, dx, dy, dz)
         if reach < np.inf:
             return DETECTED, reach
     if not meets:
         return LEFT, 0.0
-    return (TRUNCATED if steps >= limits.max_bounces else ALIVE), 0.0
+    return (TRUNCATED if steps >= max_bounces else ALIVE), 0.0
 
 
 @jit
 def begin(start, along, length, first, columns):
     """Fill a batch with rays that have met nothing yet; the amplitude is that of the path alone."""
     batch = Batch(*columns)
-    state, last, came = batch.state, batch.last, batch.came
+    state, last, came, crossed = batch.state, batch.last, batch.came, batch.crossed
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
     for i in range(len(start)):
         x, y, z, dx, dy, dz = start[i, 0], start[i, 1], start[i, 2], along[i, 0], along[i, 1], along[i, 2]
         write_ray(state, i, x, y, z, dx, dy, dz, 0.0, 0.0, 0.0, length[i], 0.0)
-        write_last(last, came, i, -1, dx, dy, dz)
+        write_last(last, came, i, -1, 0.0, 0.0, 0.0)
+        crossed[i, COUNT], crossed[i, BACK] = 0, 0
         write_path(key, ray, bounces, serial, i, np.uint64(0), first + i, 0, i)
         write_power(lost, amplitude, reflections, i, 0.0, 1.0, 0)
 

@@ -138,15 +138,13 @@ def _bounce(
 
 def _rebound(plan: Plan, space: Workspace, bounces: int, first: int, ends: Ends) -> None:
     """`_bounce` of rays that have all just left the only body, all of ideal mirrors, in one pass."""
-    from fringetrace.tracing.intersect.embree import second_opinion
     from fringetrace.tracing.kernels_loop import rebound
 
     body, hits, count = plan.engine.bodies[0], space.hits, space.count
+    contact = plan.engine.contact(space.batch, None)
     prim = body.embree.run(hits.origin32[:count], hits.direction32[:count])
-    if not body.closed and prim.min() < 0:
-        second_opinion(body, space.batch, count, prim, hits)
     space.count, _, unsure = rebound(
-        count, bounces, prim, tuple(space.batch), body.packed, plan.engine.digit, tuple(plan.limits),
+        count, bounces, prim, tuple(space.batch), contact, body.packed, plan.engine.digit, tuple(plan.limits),
         tuple(ends), first, hits.origin32, hits.direction32,
     )  # fmt: skip
     space.doubtful += unsure
@@ -167,13 +165,14 @@ def nearest(plan: Plan, space: Workspace, passed: frozenset[int]) -> int:
     int
         How many rays were decided exactly.
     """
+    medium = None if space.light is None else space.light.medium
     if plan.forms:
         from fringetrace.tracing.intersect import on_forms
 
-        return on_forms.find(plan.engine, plan.forms, space.batch, space.count, space.hits, passed)
+        return on_forms.find(plan.engine, plan.forms, space.batch, space.count, space.hits, passed, medium)
     from fringetrace.tracing.intersect import embree
 
-    return embree.find(plan.engine, space.batch, space.count, space.hits, passed)
+    return embree.find(plan.engine, space.batch, space.count, space.hits, passed, medium)
 
 
 def _record_hits(

@@ -61,7 +61,7 @@ class SurfaceTable(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Optics:
+class SceneOptics:
     """What light meets in a scene.
 
     Attributes
@@ -157,7 +157,7 @@ def needs(scene: Scene) -> str | None:
     return None
 
 
-def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
+def optics(scene: Scene, wavelength: float | None, polarised: bool) -> SceneOptics:
     """The media, boundaries and elements of a scene at a wavelength.
 
     Parameters
@@ -169,7 +169,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
 
     Returns
     -------
-    Optics
+    SceneOptics
 
     Raises
     ------
@@ -191,7 +191,7 @@ def optics(scene: Scene, wavelength: float | None, polarised: bool) -> Optics:
     table = _table(scene, 1.0 if wavelength is None else wavelength, vacuum)
     if wavelength is not None:
         table = table._replace(k0=2.0 * math.pi / wavelength)
-    return Optics(table, vacuum, None if vacuum else wavelength, polarised, elements)
+    return SceneOptics(table, vacuum, None if vacuum else wavelength, polarised, elements)
 
 
 def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:
@@ -212,6 +212,28 @@ def _table(scene: Scene, wavelength: float, vacuum: bool) -> SurfaceTable:
         k0=0.0,
         ideal=vacuum and bool((reflection == -1.0).all() and not transmission.any()),
     )
+
+
+def sides(scene: Scene) -> npt.NDArray[np.int32]:
+    """The media beside each surface.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    (surfaces, 2) int32
+        Numbers of the media in front and behind, see `scene_media`; -1 for surfaces that part none, -2 if
+        they let no light through either.
+    """
+    numbers = {medium: number for number, medium in enumerate(scene_media(scene))}
+    opaque = constants(scene)[1] == 0.0
+    table = np.repeat(np.where(opaque, -2, -1)[:, None], 2, axis=1).astype(np.int32)
+    for number, surface in enumerate(scene.surfaces):
+        if surface.boundary:
+            table[number] = [numbers[side or scene.around] for side in (surface.front, surface.back)]
+    return table
 
 
 def _index(medium: Material, wavelength: float) -> complex:

@@ -11,10 +11,10 @@ from fringetrace.tracing.rays import Rays, launch
 if TYPE_CHECKING:
     from fringetrace.tracing.intersect.embree import Engine
     from fringetrace.tracing.intersect.on_forms import Formed
-    from fringetrace.tracing.optics_table import Optics
+    from fringetrace.tracing.optics_table import SceneOptics
 
 
-class Limits(NamedTuple):
+class TraceLimits(NamedTuple):
     """Where paths end, as the kernels take it.
 
     Attributes
@@ -50,8 +50,8 @@ class Plan:
     engine: Engine
     forms: tuple[Formed, ...]
     passed: frozenset[int]
-    optics: Optics
-    limits: Limits
+    optics: SceneOptics
+    limits: TraceLimits
     record: bool
     warned: set[str] | None = None
 

@@ -21,7 +21,7 @@ from fringetrace.tracing.batch import Ends, Light, blank, part
 from fringetrace.tracing.checks import Losses
 from fringetrace.tracing.loop import Chunk, advance
 from fringetrace.tracing.paths import Paths, join
-from fringetrace.tracing.plan import Limits, Plan
+from fringetrace.tracing.plan import Plan, TraceLimits
 from fringetrace.tracing.rays import Rays
 from fringetrace.tracing.record import tables
 from fringetrace.tracing.workspace import Workspace
@@ -89,7 +89,7 @@ def _plan(
     engine = build(
         scene, passed | {i for i, surface in enumerate(scene.surfaces) if surface.form is not None}
     )
-    limits = Limits(
+    limits = TraceLimits(
         screen=(0.0,) * 15 if ccd is None else screen(ccd),
         has_screen=ccd is not None,
         max_bounces=min(int(options.max_bounces), MOST),

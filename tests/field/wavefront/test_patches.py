@@ -97,7 +97,7 @@ def test_what_is_refused():
         ft.irradiance(replace(paths, source=ft.Rays([(0, 0, 0)], [(0, 0, 1)])), HENE, "wavefront")
     with pytest.raises(ValueError, match="at least one Paths, got none"):
         ft.complex_field([], HENE, "wavefront")
-    with pytest.raises(ValueError, match="'rays'.*, got 'guess'"):
+    with pytest.raises(ValueError, match=r"'rays'.*, got 'guess'"):
         ft.complex_field(paths, HENE, "guess")
     with pytest.raises(ValueError, match="wavelength"):
         ft.irradiance(paths, -1.0)

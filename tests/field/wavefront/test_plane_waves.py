@@ -125,7 +125,9 @@ def test_a_gaussian_beam_is_not_interpolated():
     total = [waist * math.sqrt(math.pi / 8) * math.erf(math.sqrt(2) * x / waist) for x in edge]
     line = np.diff(total) / paths.ccd.pitch
     # two Gauss points on a seventh of a waist: (1/7)^4 / 4320 times the fourth derivative, 48
-    assert ft.irradiance(paths, HENE) == pytest.approx(np.outer(line, line), abs=1e-5)
+    assert ft.irradiance(paths, HENE, "wavefront") == pytest.approx(np.outer(line, line), abs=1e-5)
+    # five points on each of two halves of a pixel, exact to the third order
+    assert ft.irradiance(paths, HENE, "facets") == pytest.approx(np.outer(line, line), abs=2e-5)
 
 
 def test_what_is_refused():

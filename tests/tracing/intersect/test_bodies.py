@@ -40,7 +40,7 @@ def test_the_tree_holds_every_triangle_once_in_boxes_around_it(count):
 
 CROWD = """
 import fringetrace as ft
-from fringetrace.engine import build
+from fringetrace.tracing.intersect.embree import build
 
 sample = ft.Surface(ft.shapes.plate(1.0, 1.0), ft.Mirror())
 bodies = [build(ft.Scene([sample.moved((0.0, 0.0, float(k)))])).bodies[0] for k in range(1100)]

@@ -14,6 +14,17 @@ EPS = float(np.finfo(np.float64).eps)
 seeds = st.integers(0, 2**32 - 1)
 
 
+def decide(some, ray, guess, limit, side, came):
+    """Path and triangle of the exact search on a body, for a ray that has crossed nothing where it stands."""
+    owner, sides = np.zeros(len(some.faces), dtype=np.int32), np.full((1, 2), -1, dtype=np.int32)
+    medium, crossed = np.zeros(1, dtype=np.int32), np.zeros((1, 16), dtype=np.int32)
+    contact = (owner, sides, np.zeros(1), medium, crossed, 0, some.oriented, some.closed)
+    tree = (some.tree.corners, some.tree.order, some.tree.lower, some.tree.upper)
+    return exact.decide(
+        ray, -1, guess, limit, side, came, 0, contact, some.planes, tree, some.frame[6]
+    )[:2]  # fmt: skip
+
+
 def body(mesh):
     """The one body of a scene of one mirror."""
     return embree.build(ft.Scene([ft.Surface(mesh, ft.Mirror())])).bodies[0]
@@ -71,17 +82,16 @@ def test_the_exact_search_finds_what_the_twin_finds(mesh):
     direction = unit(rng.normal(size=(500, 3)))
     corners = some.tree.corners.reshape(-1, 3, 3)
     path, triangle = twin.nearest(corners, start, direction, np.full(500, -1))
-    tree = (some.planes, some.tree.corners, some.tree.order, some.tree.lower, some.tree.upper, some.frame[6])
     for guess in (-1, 0, 7):
         for i in range(len(start)):
             ray = (*start[i], *direction[i])
             # a source: touches nothing, left nothing
-            found = exact.decide(*ray, -1, guess, np.inf, 2, *direction[i], *tree)
+            found = decide(some, ray, guess, np.inf, 2, tuple(direction[i]))
             assert found[1] == triangle[i]
             assert found[0] == pytest.approx(path[i], rel=1e-12)
             # nothing before what is there
             assert (
-                exact.decide(*ray, -1, guess, 0.999 * path[i], 2, *direction[i], *tree)[1] == -1
+                decide(some, ray, guess, 0.999 * path[i], 2, tuple(direction[i]))[1] == -1
                 or path[i] == np.inf
             )
     assert (triangle >= 0).sum() > 50
@@ -89,10 +99,10 @@ def test_the_exact_search_finds_what_the_twin_finds(mesh):
 
 def test_a_touched_face_is_met_only_by_light_that_goes_on_through_it():
     some = body(shapes.plate(2.0, 2.0))
-    tree = (some.planes, some.tree.corners, some.tree.order, some.tree.lower, some.tree.upper, some.frame[6])
 
-    def meets(dz, side, bz=0.0):
-        return exact.decide(0.1, 0.3, 0.0, 0.0, 0.0, dz, -1, -1, np.inf, side, 0.0, 0.0, bz, *tree)[1] >= 0
+    def meets(dz, side, bz=1.0, some=some):
+        ray = (0.1, 0.3, 0.0, 0.0, 0.0, dz)
+        return decide(some, ray, -1, np.inf, side, (0.0, 0.0, bz))[1] >= 0
 
     # before the front (side 1), behind it (-1), a source (2)
     assert [meets(dz, side) for side in (1, -1, 2) for dz in (1.0, -1.0)] == [
@@ -105,3 +115,15 @@ def test_a_touched_face_is_met_only_by_light_that_goes_on_through_it():
     ]
     # in the sense in which it came (0)
     assert [meets(dz, 0, bz) for dz in (1.0, -1.0) for bz in (1.0, -1.0)] == [True, False, False, True]
+
+
+def test_a_source_on_a_solid_meets_it_only_going_in_and_on_an_open_sheet_never():
+    solid, sheet = body(shapes.plate(2.0, 2.0, 1.0).moved((0, 0, 1.0))), body(shapes.plate(2.0, 2.0))
+    z = solid.vertices[:, 2].max()
+    for dz in (1.0, -1.0):
+        ray = (0.1, 0.3, z, 0.0, 0.0, dz)
+        path, triangle = decide(solid, ray, -1, np.inf, 1, (0.0, 0.0, 0.0))
+        assert (triangle >= 0) == (dz < 0.0)
+        assert path == (0.0 if dz < 0.0 else np.inf)
+        ray = (0.1, 0.3, 0.0, 0.0, 0.0, dz)
+        assert decide(sheet, ray, -1, np.inf, 1, (0.0, 0.0, 0.0))[1] == -1

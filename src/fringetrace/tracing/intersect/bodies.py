@@ -28,6 +28,8 @@ CLEAR = 1e-3
 # A surface is a plane if no vertex stands off it by more than this part of the unit box; around a
 # surface there is this much room, beyond all that float32 and restarts move a ray.
 FLAT, ROOM = 1e-14, 1e-4
+# A corner is moved out no farther than this many times what the sides are: it would be far for needles.
+SHARP = 64.0
 # How many faces lend their planes to the test for that, and from how many vertices on a box stands in.
 FACES, MANY = 16, 10000
 
@@ -56,6 +58,7 @@ class Body:
     faces: IntArray
     planes: FloatArray  # (t, 16)
     gentle: npt.NDArray[np.uint8]  # (t,), a bit for each shared edge with a fold of 26 degrees or less
+    beside: IntArray  # (t, 3), the triangle across each edge, -1 if none or several
     frame: FloatArray  # (7,)
     oriented: bool
     closed: bool
@@ -82,7 +85,8 @@ class Body:
         from embreex.rtcore_scene import EmbreeScene
 
         scene = EmbreeScene(_device(), robust=True)
-        TriangleMesh(scene, self.vertices.astype(np.float32), self.faces.astype(np.int32))
+        corners = _grown(self.vertices[self.faces], self.planes, self.beside)
+        TriangleMesh(scene, corners, np.arange(3 * len(self.faces), dtype=np.int32).reshape(-1, 3))
         one = np.zeros((1, 3), dtype=np.float32)
         scene.run(one, one + np.float32(1.0))  # commits, before threads share it
         return scene
@@ -92,12 +96,28 @@ class Body:
         """Bounding volume tree in float64 that decides doubtful hits."""
         return _tree(self.vertices[self.faces], self.frame[6])
 
+    @property
+    def sheet(self) -> npt.NDArray[np.bool_]:
+        """(s,) Which surfaces are one plane, of one layer as far as is known: no ray comes back to them."""
+        layered = "crowd" in vars(self) and len(self.crowd) > 0
+        return np.zeros_like(self.flat) if layered else self.flat
+
+    @cached_property
+    def crowd(self) -> FloatArray:
+        """(t, 6) Where others are too near to each triangle for float32, as boxes; (0, 6) if nowhere."""
+        from fringetrace.tracing.intersect import crowds
+
+        tree = self.tree
+        boxes = crowds.near(self.planes, tree.corners, tree.order, tree.lower, tree.upper, self.beside)
+        return np.asarray(boxes if np.isfinite(boxes[:, 0]).any() else boxes[:0])
+
     @cached_property
     def packed(self) -> tuple[Any, ...]:
         """Body data in the form that the kernels read."""
         tree = (self.tree.corners, self.tree.order, self.tree.lower, self.tree.upper)
         return (
-            self.first, self.stop, self.oriented, self.closed, self.frame, self.planes, self.gentle, tree
+            self.first, self.stop, self.oriented, self.closed, self.frame, self.planes, self.gentle,
+            self.crowd, tree,
         )  # fmt: skip
 
 
@@ -160,6 +180,22 @@ def _planes(corners: FloatArray) -> FloatArray:
     return planes
 
 
+def _grown(corners: FloatArray, planes: FloatArray, beside: IntArray) -> Float32:
+    """Corners (3 t, 3) of triangles grown in their planes by `GROWN` on all sides, less at sharp corners.
+
+    At each edge one of the two triangles grows, or both: Embree is a little slower where both do.
+    """
+    from fringetrace.tracing.intersect.crowds import spared
+    from fringetrace.tracing.intersect.kernels import GROWN
+
+    inward = planes[:, 4:].reshape(-1, 3, 4)[:, :, :3]
+    between = inward + np.roll(inward, 1, axis=1)  # of the two edges at each corner
+    least = 2.0 / SHARP**2
+    outward = between / np.maximum((between**2).sum(axis=2, keepdims=True) * 0.5, least)
+    outward[spared(beside)] = 0.0
+    return np.asarray((corners - GROWN * outward).reshape(-1, 3), dtype=np.float32)
+
+
 def _aligned(rows: int) -> FloatArray:
     """Room for 16 numbers a row, each row in two cache lines."""
     raw = np.empty(16 * rows + 8)
@@ -167,24 +203,34 @@ def _aligned(rows: int) -> FloatArray:
     return raw[begin : begin + 16 * rows].reshape(rows, 16)
 
 
-def _topology(faces: IntArray, normal: FloatArray) -> tuple[bool, bool, FloatArray]:
-    """Whether faces are wound alike, whether they close, and the cosines of the folds (f, 3).
+def _topology(faces: IntArray, normal: FloatArray) -> tuple[bool, bool, FloatArray, IntArray]:
+    """Whether faces are wound alike, whether they close, the cosines of the folds, and who is beside whom.
 
-    The cosine is between the normals of two faces that share an edge: -1 is a knife's edge. An edge
-    that is not shared has NaN.
+    The cosine (f, 3) is between the normals of two faces that share an edge: -1 is a knife's edge. An edge
+    that is not shared, or by more than two faces, has NaN, and -1 in the table of neighbours (f, 3).
+    Faces are wound alike where each edge is used as often one way as the other, or once.
     """
     count = int(faces.max()) + 1
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     edge, back = start * count + end, end * count + start
     order = np.argsort(edge, kind="stable")
     ordered = edge[order]
-    oriented = bool((np.diff(ordered) > 0).all())
     partner = np.minimum(np.searchsorted(ordered, back), len(ordered) - 1)
     shared = ordered[partner] == back
+    simple = bool((np.diff(ordered) > 0).all())
+    oriented, closed = simple, simple and bool(shared.all())
+    if not simple:  # several faces at an edge
+        uses, returns = (
+            np.searchsorted(ordered, key, side="right") - np.searchsorted(ordered, key)
+            for key in (edge, back)
+        )
+        closed = bool((uses == returns).all())
+        oriented = bool(((uses == returns) | ((uses == 1) & (returns == 0))).all())
+        shared &= (uses == 1) & (returns == 1)
     face, other = np.flatnonzero(shared) // 3, order[partner[shared]] // 3
-    cosine = np.full(len(edge), np.nan)
-    cosine[shared] = np.einsum("ij,ij->i", normal[face], normal[other])
-    return oriented, oriented and bool(shared.all()), cosine.reshape(-1, 3)
+    cosine, beside = np.full(len(edge), np.nan), np.full(len(edge), -1, dtype=np.int64)
+    cosine[shared], beside[shared] = np.einsum("ij,ij->i", normal[face], normal[other]), other
+    return oriented, closed, cosine.reshape(-1, 3), beside.reshape(-1, 3)
 
 
 def _restart(cosine: float) -> float:
@@ -233,9 +279,9 @@ def unite(meshes: Sequence[Mesh], members: tuple[int, ...], first: int) -> Body:
     local = (vertices - centre) * scale
     corners = local[faces]
     planes = _planes(corners)
-    oriented, closed, cosine = _topology(faces, planes[:, :3])
+    oriented, closed, cosine, beside = _topology(faces, planes[:, :3])
     if not closed:  # perhaps only because equal vertices have different numbers
-        oriented, closed, cosine = _topology(weld(local, faces)[1], planes[:, :3])
+        oriented, closed, cosine, beside = _topology(weld(local, faces)[1], planes[:, :3])
     sharpest = float(np.fmin.reduce(cosine, axis=None, initial=1.0))
     frame = np.empty(7)
     frame[:3], frame[3] = centre, scale
@@ -244,7 +290,7 @@ def unite(meshes: Sequence[Mesh], members: tuple[int, ...], first: int) -> Body:
     frame[6] = 32.0 * EPSILON * (1.0 + np.abs(centre).max() * scale)
     gentle = np.packbits((cosine > GENTLE) & oriented, axis=1, bitorder="little")[:, 0]
     shells = _shells(own, planes, corners)
-    return Body(first, local, faces, planes, gentle, frame, oriented, closed, members, *shells)
+    return Body(first, local, faces, planes, gentle, beside, frame, oriented, closed, members, *shells)
 
 
 def _shells(

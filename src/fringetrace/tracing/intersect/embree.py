@@ -12,18 +12,35 @@ from fringetrace.core import Array, FloatArray
 from fringetrace.scene import Scene
 from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.intersect.bodies import Body, IntArray, group, unite
+from fringetrace.tracing.optics_table import sides
 
 
 @dataclass(frozen=True, eq=False)
 class Engine:
     """Intersection engine: the bodies of a scene, and the surface of each triangle.
 
-    `owner` (t,) is the surface of a triangle, `offset` (surfaces,) the number of its first one.
+    `owner` (t,) is the surface of a triangle, `offset` (surfaces,) the number of its first one, `sides`
+    (surfaces, 2) the media beside it, see `optics_table.sides`.
     """
 
     bodies: tuple[Body, ...]
     owner: npt.NDArray[np.int32]
     offset: IntArray
+    sides: npt.NDArray[np.int32]
+
+    @cached_property
+    def grain(self) -> FloatArray:
+        """(surfaces,) metres: how far rounding may take a hit off each surface."""
+        table = np.empty(len(self.offset))
+        for body in self.bodies:
+            table[list(body.surfaces)] = body.frame[6] / body.frame[3]
+        return table
+
+    def contact(self, batch: Batch, medium: Array | None) -> tuple[Array, ...]:
+        """What decides about faces at the same place, as the kernels take it."""
+        if medium is None:
+            medium = np.zeros(len(batch.last), dtype=np.int32)
+        return self.owner, self.sides, self.grain, medium, batch.crossed, batch.last
 
     @property
     def base(self) -> int:
@@ -49,7 +66,6 @@ class Hits:
     origin32: npt.NDArray[np.float32]
     direction32: npt.NDArray[np.float32]
     sent: IntArray
-    asked: IntArray
 
     @staticmethod
     def blank(rows: int) -> Hits:
@@ -60,7 +76,6 @@ class Hits:
             origin32=np.empty((rows, 3), dtype=np.float32),
             direction32=np.empty((rows, 3), dtype=np.float32),
             sent=np.empty(rows, dtype=np.int64),
-            asked=np.empty(rows, dtype=np.int64),
         )
 
 
@@ -91,7 +106,7 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
                 first += len(meshes[i].faces)
                 owner.append(np.full(len(meshes[i].faces), i, dtype=np.int32))
             bodies.append(body)
-        scene.derived[name] = Engine(tuple(bodies), np.concatenate(owner), offset)
+        scene.derived[name] = Engine(tuple(bodies), np.concatenate(owner), offset, sides(scene))
     engine: Engine = scene.derived[name]
     return engine
 
@@ -105,37 +120,20 @@ def aim(
     body = engine.bodies[number]
     count: int = kernels.aim(
         rows, batch.state, batch.last, body.frame, body.first, body.stop, engine.owner,
-        np.array(body.surfaces), body.flat, *body.boxes, cull, hits.met, hits.triangle,
+        np.array(body.surfaces), body.sheet, *body.boxes, cull, hits.met, hits.triangle,
         fresh, hits.origin32, hits.direction32, hits.sent,
     )  # fmt: skip
     return count
 
 
-def second_opinion(body: Body, batch: Batch, count: int, prim: npt.NDArray[np.int32], hits: Hits) -> None:
-    """Other opinions, a little aside, on suspicious answers; -2 where one of them differs.
-
-    Three of rays that come from elsewhere, one of rays that have just left this body.
-    """
-    from fringetrace.tracing.intersect import kernels
-
-    for leaving, turns in ((False, 3), (True, 0 if body.closed else 1)):
-        if turns == 0:
-            continue
-        found = kernels.suspect(
-            hits.sent, count, prim, batch.state, batch.last, body.packed, hits.origin32, leaving, hits.asked,
-        )  # fmt: skip
-        rows = hits.asked[:found]
-        moved, heading = np.empty((2, found, 3), dtype=np.float32)
-        first = prim[rows]
-        for turn in range(turns if found else 0):
-            kernels.beside(
-                hits.sent, hits.asked, found, batch.state, batch.last, body.packed, hits.origin32, turn,
-                moved, heading,
-            )  # fmt: skip
-            prim[rows[body.embree.run(moved, heading) != first]] = -2
-
-
-def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[int] = frozenset()) -> int:
+def find(
+    engine: Engine,
+    batch: Batch,
+    rows: int,
+    hits: Hits,
+    passed: frozenset[int] = frozenset(),
+    medium: Array | None = None,
+) -> int:
     """Find the nearest hit of each ray, into `hits`.
 
     Parameters
@@ -148,6 +146,8 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
         At least as many rows.
     passed : set of surface numbers
         Surfaces to be passed over; each must have a body of its own.
+    medium : int32, optional
+        Number of the medium that each ray is in, at least as many rows; default all 0.
 
     Returns
     -------
@@ -157,6 +157,7 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
     from fringetrace.tracing.intersect import kernels
 
     origin32, direction32 = hits.origin32, hits.direction32
+    contact = engine.contact(batch, medium)
     doubtful = 0
     fresh = True
     for number, body in enumerate(engine.bodies):
@@ -168,9 +169,9 @@ def find(engine: Engine, batch: Batch, rows: int, hits: Hits, passed: frozenset[
             continue
         body.prepare()
         prim = body.embree.run(origin32[:count], direction32[:count])
-        second_opinion(body, batch, count, prim, hits)
         doubtful += kernels.measure(
-            hits.sent, count, prim, batch.state, batch.last, batch.came, body.packed, hits.met, hits.triangle,
+            hits.sent, count, prim, batch.state, batch.last, batch.came, contact, body.packed, hits.met,
+            hits.triangle,
         )  # fmt: skip
     if fresh:
         hits.met[:rows, 0] = np.inf

@@ -6,10 +6,17 @@ n.p + c = 0 with n unit, then three edge planes whose value is the distance insi
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from fringetrace.core import jit, part
+from fringetrace.tracing.intersect.coincident import SEAM, SHEET, onward, sooner
 
+# Flatter to a face than this (cosine) no crack beside it is looked for.
+FLAT = 0.01
+# A ray slides along a face, and does not cross it, if its cosine to the normal is under so many roundings.
+SLIDE = 64.0
 # Triangles in a leaf of the tree.
 LEAF = 4
 
@@ -109,6 +116,23 @@ def inset(planes, tri, x, y, z):
     return least if least < c else c
 
 
+@jit
+def hidden(planes, corners, tri, left, dx, dy, dz, tolerance):
+    """Whether a triangle lies wholly on the other side of the plane of `left` than the ray that leaves this.
+
+    Not so for two layers of a sheet.
+    """
+    nx, ny, nz, c = planes[left, 0], planes[left, 1], planes[left, 2], planes[left, 3]
+    if abs(nx * planes[tri, 0] + ny * planes[tri, 1] + nz * planes[tri, 2]) > SHEET:
+        return False
+    sense = 1.0 if nx * dx + ny * dy + nz * dz > 0.0 else -1.0
+    for k in (0, 3, 6):
+        height = nx * corners[tri, k] + ny * corners[tri, k + 1] + nz * corners[tri, k + 2] + c
+        if sense * height > tolerance:
+            return False
+    return True
+
+
 @part
 def enters(lower, upper, node, x, y, z, ix, iy, iz, nearest):
     """Path length at which a ray enters a box, or infinity if not before `nearest`."""
@@ -130,31 +154,34 @@ def inverse(component):
 
 
 @jit
-def decide(
-    x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper, tolerance
-):  # fmt: skip
-    """First hit of a ray in float64, by a bounding volume tree; triangle -1 if none before `limit`.
+def decide(ray, skip, guess, limit, side, came, row, contact, planes, tree, tolerance):
+    """First hit of a ray in float64: path length, triangle, place in the list of faces crossed.
 
-    `skip` is the triangle just left, `guess` one that is likely hit (or below 0). A face that
-    the start touches is hit at 0 if the ray goes on through it: seen from the region it travels
-    in (`side` = +-1: before or behind oriented faces), or, for side = 0, in the sense in which
-    it came, along b. side = 2: a source, which touches nothing.
+    The triangle is -1 if there is none before `limit`. `skip` is the triangle just left, `guess` one that
+    is likely hit (or below 0). A face that the start touches is hit at 0 if the ray goes on through it, see
+    `coincident.onward`; `side` = 2: it touches nothing. A line that passes a triangle of an open body by no
+    more than `tolerance` meets it if nothing else is there: it is in a crack between faces.
     """
+    x, y, z, dx, dy, dz = ray
+    owner, sides, medium, first = contact[0], contact[1], contact[3][row], contact[5]
+    corners, order, lower, upper = tree
     magnitude = max(abs(dx), abs(dy), abs(dz))
     axis = 0 if abs(dx) == magnitude else (1 if abs(dy) == magnitude else 2)
     px, py, pz = permute(dx, dy, dz, axis)
     shear_x, shear_y = px / pz, py / pz
     ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
-    nearest, best = limit, -1
+    nearest, best, best_back = limit, np.int64(-1), 0
+    beside, rim, cracks = limit, np.int64(-1), not contact[7]
+    hit: Any = (np.int64(0), 0.0, (0.0, 0.0, 0.0), limit, np.int64(-1))
     leaves = len(lower) // 2
     stack = np.empty(64, np.int64)
     stack[0] = 1
     depth = 1
-    first = guess >= 0 and guess != skip
+    start = guess >= 0 and guess != skip
     while depth > 0:
         depth -= 1
         node = stack[depth]
-        if first:  # bounds the search before it begins
+        if start:  # bounds the search before it begins
             begin, end = -1, 0
             depth += 1
         else:
@@ -174,41 +201,59 @@ def decide(
             begin = LEAF * (node - leaves)
             end = begin + LEAF
         for slot in range(begin, end):
-            tri = guess if first else order[slot]
+            tri = guess if start else np.int64(order[slot])
             if tri < 0 or tri == skip:
                 continue
             nx, ny, nz = planes[tri, 0], planes[tri, 1], planes[tri, 2]
             height = nx * x + ny * y + nz * z + planes[tri, 3]
             facing = nx * dx + ny * dy + nz * dz
-            if side != 2 and abs(height) <= tolerance and inset(planes, tri, x, y, z) >= -tolerance:
-                onward = facing * side < 0.0 if side != 0 else facing * (nx * bx + ny * by + nz * bz) > 0.0
-                if not onward:
+            back, tie = 0, 0.0
+            aside = inset(planes, tri, x, y, z) if side != 2 and abs(height) <= tolerance else -np.inf
+            if aside >= -tolerance:
+                back = onward(tri, skip, facing, side, aside <= SEAM, came, row, contact, planes)
+                if back < 0 or (skip >= 0 and hidden(planes, corners, tri, skip, dx, dy, dz, tolerance)):
                     continue
                 path = 0.0
             else:
-                if facing == 0.0:
+                if abs(facing) < SLIDE * tolerance:
                     continue
                 path = -height / facing
-                if not (path > 0.0 and path <= nearest):
+                tie = 2.0 * tolerance / abs(facing)
+                if not (path > 0.0 and nearest > 0.0 and path <= nearest + tie):
                     continue
                 if not crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
+                    here = side != 2 and abs(height) <= tolerance
+                    if cracks and not here and (abs(side) != 1 or facing * side < 0.0):
+                        aside = inset(planes, tri, x + path * dx, y + path * dy, z + path * dz)
+                        first_there = path < beside - tie or (path <= beside + tie and facing < 0.0)
+                        if aside >= -tolerance / max(abs(facing), FLAT) and first_there:
+                            beside, rim = path, tri
                     continue
-            if path < nearest or (path == nearest and tri < best):
-                nearest, best = path, tri
-        first = False
-    return nearest, best
+            found = (np.int64(owner[first + tri]), facing, (nx, ny, nz), path, tri)
+            if path < nearest - tie or (
+                path <= nearest + tie and (path < nearest if best < 0 else sooner(sides, medium, found, hit))
+            ):
+                nearest, best, best_back, hit = path, tri, back, found
+        start = False
+    if rim >= 0 and beside < nearest - 64.0 * tolerance:
+        return beside, rim, 0
+    return nearest, best, best_back
 
 
 @jit
-def first_hits(start, direction, skip, limit, planes, corners, order, lower, upper, tolerance):
-    """First hits of rays in float64: path length and triangle, -1 if none before `limit`.
+def first_hits(start, direction, skip, limit, planes, tree, tolerance):
+    """First hits of rays beyond their starts, in float64: path and triangle, -1 if none before `limit`.
 
     `start` (n, 3), `limit` (n,) in the unit box; `skip` (n,) is a triangle to be passed over.
     """
     path, triangle = np.empty(len(start)), np.empty(len(start), np.int64)
+    contact = (
+        np.zeros(len(planes), np.int32), np.full((1, 2), -1, np.int32), np.zeros(1), np.zeros(1, np.int32),
+        np.zeros((1, 3), np.int32), 0, True, True,
+    )  # fmt: skip
     for i in range(len(start)):
-        path[i], triangle[i] = decide(
-            start[i, 0], start[i, 1], start[i, 2], direction[i, 0], direction[i, 1], direction[i, 2], skip[i],
-            -1, limit[i], 2, 0.0, 0.0, 0.0, planes, corners, order, lower, upper, tolerance,
-        )  # fmt: skip
+        ray = (start[i, 0], start[i, 1], start[i, 2], direction[i, 0], direction[i, 1], direction[i, 2])
+        path[i], triangle[i], _ = decide(
+            ray, skip[i], np.int64(-1), limit[i], 2, (0.0, 0.0, 0.0), 0, contact, planes, tree, tolerance
+        )
     return path, triangle

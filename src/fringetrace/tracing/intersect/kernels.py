@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from fringetrace.core import jit, part
+from fringetrace.tracing.intersect.coincident import BACK, sooner
 from fringetrace.tracing.intersect.exact import decide, enters, inset, inverse
 
 # float32 resolves 2**-24 of the unit box; eight such steps separate a restart from its surface.
@@ -22,13 +23,18 @@ SHIFT = 2.0**-20
 MARGIN = 8.0 * SHIFT
 # A ray leaving flatter than this (cosine to the normal) grazes.
 GRAZING = 0.125
+# Flatter to a face than this (cosine) float32 knows the path to it to less than 2**-13 of the box.
+FLAT = 2.0**-10
+# Paths that agree to this part of them are the same, as far as roundings tell.
+TIE = 2.0**-49
 # A fold with normals nearer than this (cosine) is gentle: a ray steeper than STEEP (cosine to the
 # normal) cannot meet both of its faces, 26 degrees against 30.
 GENTLE, STEEP = 0.9, 0.5
-# On a body that the ray has not just left, Embree starts this far behind the ray.
-BEHIND = 2.0**-18
-# The second opinion on a suspicious answer comes from this far aside.
-ASIDE = 2.0**-19
+# On a body that the ray has not just left, Embree starts this far behind the ray; behind a ray that grazes
+# farther, up to one over `LEAST` times.
+BEHIND, LEAST = 2.0**-18, 2.0**-10
+# Embree is given triangles that are larger by this on all sides: it has holes at vertices, and blurs rims.
+GROWN = SHIFT
 
 # Columns of a batch's `state`: origin, direction, normal of the face last left, optical path (metres),
 # distance of the start from that face's nearest edge (unit box), cosine of the ray to that normal.
@@ -84,7 +90,13 @@ def aim(
             reach = np.sqrt(square)
             if along > reach:
                 continue
-            step = -along - reach if along < -reach else -BEHIND
+            if along < -reach:
+                step = -along - reach
+            else:
+                step = -BEHIND
+                if last[row] >= 0:  # faces may lie on the one that it left, and it may graze them
+                    cosine = abs(state[row, NX] * dx + state[row, NY] * dy + state[row, NZ] * dz)
+                    step /= min(max(cosine / GRAZING, LEAST), 1.0)
         if cull and (len(members) > 1 or (own and flat[0])):
             ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
             left = owner[last[row]] if own else -1
@@ -108,70 +120,6 @@ def aim(
         sent[count] = row
         count += 1
     return count
-
-
-@jit
-def suspect(sent, count, prim, state, last, body, origin32, leaving, asked):
-    """Rays whose hits need more queries, among those that are just `leaving` the body or not.
-
-    Embree has holes at exact vertices, and float32 blurs the rim of an open body. Suspicious are
-    misses of an open body, and, of rays that have not just left it, misses of a closed body from
-    within its bounding sphere and hits on its inside. Returns how many.
-    """
-    first, stop, _, closed, frame, planes, _, _ = body
-    found = 0
-    inner = (1.0 - 1e-4) * frame[4] * frame[4]
-    for i in range(count):
-        row = np.uintp(sent[i])
-        tri = prim[i]
-        if (first <= last[row] < stop) != leaving:
-            continue
-        if closed and tri >= 0:
-            facing = planes[tri, 0] * state[row, DX] + planes[tri, 1] * state[row, DY]
-            if facing + planes[tri, 2] * state[row, DZ] <= 0.0:
-                continue
-        elif closed:
-            if origin32[i, 0] ** 2 + origin32[i, 1] ** 2 + origin32[i, 2] ** 2 >= inner:
-                continue
-        elif tri >= 0:
-            continue
-        asked[found] = i
-        found += 1
-    return found
-
-
-@jit
-def beside(sent, asked, found, state, last, body, origin32, turn, moved, heading):
-    """Displace suspicious rays sideways by `ASIDE`, in direction `turn` (0, 1, 2: 120 degrees apart).
-
-    Whichever way a rim runs, one of the three sides is well inside it. None goes through the face
-    just left.
-    """
-    first, stop = body[0], body[1]
-    cos, sin = np.cos(2.0 * np.pi * turn / 3.0), np.sin(2.0 * np.pi * turn / 3.0)
-    for i in range(found):
-        row = np.uintp(sent[asked[i]])
-        dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
-        # u and v across the ray, from the axis that it is least along
-        if abs(dx) <= abs(dy) and abs(dx) <= abs(dz):
-            ux, uy, uz = 0.0, dz, -dy
-        elif abs(dy) <= abs(dz):
-            ux, uy, uz = -dz, 0.0, dx
-        else:
-            ux, uy, uz = dy, -dx, 0.0
-        size = ASIDE / np.sqrt(ux * ux + uy * uy + uz * uz)
-        ux, uy, uz = ux * size, uy * size, uz * size
-        vx, vy, vz = dy * uz - dz * uy, dz * ux - dx * uz, dx * uy - dy * ux
-        ax, ay, az = cos * ux + sin * vx, cos * uy + sin * vy, cos * uz + sin * vz
-        if first <= last[row] < stop:
-            nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
-            up = ax * nx + ay * ny + az * nz
-            if up * (nx * dx + ny * dy + nz * dz) < 0.0:
-                ax, ay, az = ax - up * nx, ay - up * ny, az - up * nz
-        moved[i, 0] = origin32[asked[i], 0] + ax
-        moved[i, 1] = origin32[asked[i], 1] + ay
-        moved[i, 2] = origin32[asked[i], 2] + az
-        heading[i, 0], heading[i, 1], heading[i, 2] = dx, dy, dz
 
 
 @jit
@@ -203,8 +151,8 @@ def crossing(planes, tri, x, y, z, dx, dy, dz):
 def unsure(guess, again, path, facing, own, leaving, closed):
     """Whether float32 is in doubt, edges aside; `again`: it names the triangle just left."""
     if guess < 0:
-        return (guess == -2) | (own & closed & (leaving < 0.0))
-    measurable = (path > MARGIN) & (path < 1e300)
+        return own & closed & (leaving < 0.0)
+    measurable = (path > MARGIN) & (path < 1e300) & (abs(facing) > FLAT)
     return (not measurable) | (own & (again | (closed & (facing * leaving >= 0.0))))
 
 
@@ -222,11 +170,14 @@ def clamped(planes, tri, x, y, z):
 
 
 @jit
-def decided(ray, came, normal, left, leaving, guess, limit, body):
-    """Exact hit of a doubtful ray before `limit`: triangle, path, a point inside its edges, edge distance."""
-    _, _, oriented, closed, frame, planes, _, (corners, order, lower, upper) = body
+def decided(ray, came, normal, left, leaving, guess, limit, row, contact, body):
+    """Exact hit of a doubtful ray before `limit`: triangle, (path, point inside its edges, rim), back.
+
+    `back` is the place of the triangle in the list of faces that the ray has crossed, see `coincident`.
+    """
+    first, _, oriented, closed, frame, planes, _, _, tree = body
+    owner, sides, grain, medium, crossed, last = contact
     x, y, z, dx, dy, dz = ray
-    bx, by, bz = came
     radius, tolerance = frame[4], frame[6]
     along = x * dx + y * dy + z * dz
     start = 0.0
@@ -234,37 +185,48 @@ def decided(ray, came, normal, left, leaving, guess, limit, body):
         start = -along - 1.5 * radius
         x, y, z = x + start * dx, y + start * dy, z + start * dz
     side = 0
-    if left == -2 or start > 0.0:
+    if start > 0.0:
         side = 2
+    elif left == -2:
+        side = 1
     elif left >= 0 and oriented:
         side = 1 if leaving > 0.0 else -1
+    if left == -1:
+        tolerance += grain[owner[last[row]]] * frame[3]
     skip = left if left >= 0 else np.int64(-1)
-    path, tri = decide(
-        x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
-        tolerance,
-    )  # fmt: skip
+    table = (owner, sides, grain, medium, crossed, first, oriented, closed)
+    path, tri, back = decide(
+        (x, y, z, dx, dy, dz), skip, guess, limit, side, came, row, table, planes, tree, tolerance
+    )
     if tri < 0 and side == -1 and closed and limit == np.inf:
         # along a face to the very edge of the next: from a little further inside it cannot be missed
         nx, ny, nz = normal
         x, y, z = x - 8.0 * tolerance * nx, y - 8.0 * tolerance * ny, z - 8.0 * tolerance * nz
-        path, tri = decide(
-            x, y, z, dx, dy, dz, skip, guess, limit, side, bx, by, bz, planes, corners, order, lower, upper,
-            tolerance,
-        )  # fmt: skip
+        path, tri, back = decide(
+            (x, y, z, dx, dy, dz), skip, guess, limit, side, came, row, table, planes, tree, tolerance
+        )
     rim = np.inf
     if tri >= 0:
         x, y, z, rim = clamped(planes, tri, x + path * dx, y + path * dy, z + path * dz)
-    return tri, (start + path, x, y, z, rim)
+    return tri, (start + path, x, y, z, rim), back
 
 
 @jit
-def reviewed(ray, came, normal, left, leaving, edge, guess, facing, hit, doubt, body):
-    """Review of a hit in doubt or near an edge: whether float32 is in doubt, triangle, hit.
+def crowded(crowd, tri, x, y, z):
+    """Whether a point of a triangle is where others are near it that share no edge with it."""
+    if crowd[tri, 0] > x or crowd[tri, 1] > y or crowd[tri, 2] > z:
+        return False
+    return crowd[tri, 3] >= x and crowd[tri, 4] >= y and crowd[tri, 5] >= z
+
+
+@jit
+def reviewed(ray, came, normal, left, leaving, edge, guess, facing, hit, doubt, row, contact, body):
+    """Review of a hit in doubt or near an edge: whether float32 is in doubt, triangle, hit, back.
 
     `left` is the triangle of this body that the ray just left, at the cosine `leaving` and `edge` away
     from its nearest edge; -1: one of another body, -2: none. `hit` is path, point and rim.
     """
-    frame, planes, gentle = body[4], body[5], body[6]
+    frame, planes, gentle, crowd = body[4], body[5], body[6], body[7]
     x, y, z = ray[0], ray[1], ray[2]
     _, px, py, pz, rim = hit
     if guess >= 0 and rim <= MARGIN:
@@ -273,27 +235,68 @@ def reviewed(ray, came, normal, left, leaving, edge, guess, facing, hit, doubt, 
     near = left >= 0 and edge < frame[5]
     if near and abs(leaving) > STEEP:
         near = not softly(planes, left, x, y, z, gentle[left], frame[5])
+    if len(crowd) > 0:
+        doubt |= guess >= 0 and crowded(crowd, guess, px, py, pz)
+        near |= left >= 0 and crowded(crowd, left, x, y, z)
     if not (doubt or near):
-        return False, guess, hit
+        return False, guess, hit, 0
     # near an edge the step off the surface may have jumped something; beyond it Embree is right, if the
     # step went along the ray
     local = not doubt and abs(leaving) > GRAZING
     limit = 2.0 * MARGIN if local else np.inf
-    tri, exact = decided(ray, came, normal, left, leaving, np.int64(-1) if local else guess, limit, body)
+    tri, exact, back = decided(
+        ray, came, normal, left, leaving, np.int64(-1) if local else guess, limit, row, contact, body
+    )
     if tri >= 0 or not local:
-        return True, tri, exact
-    return True, guess, hit
+        return True, tri, exact, back
+    return True, guess, hit, 0
 
 
 @jit
-def measure(sent, count, prim, state, last, came, body, met, triangle):
+def nearer(state, row, met, triangle, contact, normal, facing, number, path):
+    """Whether a hit comes before the one in `met`: at the same place the faces decide, not the rounding.
+
+    `path` is in metres, `number` that of the triangle.
+    """
+    owner, sides, grain, medium, _, _ = contact
+    other, mine, theirs = met[row, PATH], owner[number], owner[triangle[row]]
+    if path > 0.0 and other > 0.0:
+        tie = (grain[mine] + grain[theirs] + TIE * path) / abs(facing)
+        if abs(path - other) > tie:
+            return path < other
+    elif path != other:
+        return path < other
+    fx, fy, fz = met[row, FX], met[row, FY], met[row, FZ]
+    faced = fx * state[row, DX] + fy * state[row, DY] + fz * state[row, DZ]
+    here = (np.int64(mine), facing, normal, path, np.int64(number))
+    there = (np.int64(theirs), faced, (fx, fy, fz), other, np.int64(triangle[row]))
+    return sooner(sides, medium[row], here, there)
+
+
+@jit
+def preferred(rows, state, met, triangle, contact, normals, numbers, paths):
+    """Whether hits of some rows, of triangles with `numbers`, come before those in `met`; see `nearer`."""
+    better = np.zeros(len(rows), np.bool_)
+    for i in range(len(rows)):
+        row = rows[i]
+        if not met[row, PATH] < np.inf:
+            better[i] = paths[i] < np.inf
+            continue
+        normal = (normals[i, 0], normals[i, 1], normals[i, 2])
+        facing = normal[0] * state[row, DX] + normal[1] * state[row, DY] + normal[2] * state[row, DZ]
+        better[i] = nearer(state, row, met, triangle, contact, normal, facing, numbers[i], paths[i])
+    return better
+
+
+@jit
+def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
     """Measure Embree's hits in float64; decide the doubtful ones exactly.
 
     Keeps a hit where it is nearer than the one in `met`. Returns how many were doubtful.
     """
-    first, stop, _, closed, frame, planes, _, _ = body
+    first, stop, _, closed, frame, planes, _, crowd, _ = body
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
-    unscale, margin = 1.0 / scale, frame[5]
+    unscale, margin, many = 1.0 / scale, frame[5], len(crowd) > 0
     doubtful = 0
     for i in range(count):
         row = np.uintp(sent[i])
@@ -310,21 +313,29 @@ def measure(sent, count, prim, state, last, came, body, met, triangle):
         left = last[row] - first if own else np.int64(-1 if last[row] >= 0 else -2)
         edge = state[row, EDGE] if own else np.inf
         facing, path, px, py, pz, rim = 0.0, np.inf, x, y, z, np.inf
+        back = 0
         if guess >= 0:
             k = np.uintp(guess)
             facing, _, path, px, py, pz, rim = crossing(planes, k, x, y, z, dx, dy, dz)
         doubt = unsure(guess, guess == left, path, facing, own, leaving, closed)
-        if doubt or rim <= MARGIN or edge < margin:
-            unclear, guess, (path, px, py, pz, rim) = reviewed(
+        if doubt or rim <= MARGIN or edge < margin or many:
+            unclear, guess, (path, px, py, pz, rim), back = reviewed(
                 (x, y, z, dx, dy, dz), (came[row, 0], came[row, 1], came[row, 2]), (nx, ny, nz), left,
-                leaving, edge, guess, facing, (path, px, py, pz, rim), doubt, body,
+                leaving, edge, guess, facing, (path, px, py, pz, rim), doubt, row, contact, body,
             )  # fmt: skip
             doubtful += unclear
-        if guess < 0 or not path * unscale < met[row, PATH]:
+        if guess < 0:
             continue
         # rounding left the point a little off its plane: put it back
         k = np.uintp(guess)
         nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
+        if met[row, PATH] < np.inf and not nearer(
+            state, row, met, triangle, contact, (nx, ny, nz), nx * dx + ny * dy + nz * dz, first + guess,
+            path * unscale,
+        ):  # fmt: skip
+            continue
+        if path == 0.0:
+            contact[4][row, BACK] = back
         height = nx * px + ny * py + nz * pz + planes[k, 3]
         triangle[row] = first + guess
         met[row, PATH], met[row, RIM] = path * unscale, rim

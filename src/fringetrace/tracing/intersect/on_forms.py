@@ -18,6 +18,7 @@ from fringetrace.geometry import Fit, LevelFit, Meeting
 from fringetrace.scene import Scene
 from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.intersect.bodies import Body
+from fringetrace.tracing.intersect.coincident import BACK, COLUMNS, COUNT, FIRST
 from fringetrace.tracing.intersect.embree import Engine, Hits, find as find_facets
 
 # A crossing that leads back to within this part of the body's size of the start is the start.
@@ -30,6 +31,9 @@ SIDES = 2.0
 CROSSINGS = 64
 # Where a bent form is not met from the nearest guess, guesses are this part of a side apart.
 APART = 0.25
+# Rays from farther than this many radii of a body's sphere are followed from near it: their paths have no
+# digits left for a form.
+FAR = 64.0
 # Rays that leave more steeply (cosine to the normal) come out from behind the facets at once.
 FLAT = 0.5
 
@@ -81,6 +85,7 @@ class _Rays:
 
     `own` tells whether they have just left the form, `leaving` on which side of it: 1 where the
     ray goes along the gradient, -1 against it. `up` is the normal there, to the side that they went to.
+    `shift` (n,) metres is how far along the ray `origin` lies; `near`: it may lie between form and facets.
     """
 
     origin: FloatArray
@@ -89,6 +94,8 @@ class _Rays:
     own: npt.NDArray[np.bool_]
     leaving: FloatArray
     up: FloatArray
+    shift: FloatArray
+    near: npt.NDArray[np.bool_]
 
     def part(self, rows: Array) -> _Rays:
         """Some of them."""
@@ -102,7 +109,86 @@ def _seen(form: Formed, batch: Batch, rows: Array) -> _Rays:
     along = np.where(own, form.fit.along[np.where(own, last, 0)], 0)
     facing = np.sign(np.einsum("ij,ij->i", state[:, 6:9], state[:, 3:6]))
     up = facing[:, None] * state[:, 6:9]
-    return _Rays(state[:, :3], state[:, 3:6], np.where(own, last, -1), own & (along != 0), facing * along, up)
+    origin, direction, radius = state[:, :3], state[:, 3:6], body.frame[4] / body.frame[3]
+    ahead = dot(body.frame[:3] - origin, direction)
+    shift = np.where(ahead > FAR * radius, ahead - 4.0 * radius, 0.0)
+    return _Rays(
+        origin + shift[:, None] * direction, direction, np.where(own, last, -1), own & (along != 0),
+        facing * along, up, shift, own & (along != 0),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Touch:
+    """Rays that start on a form which is not what they have just left: rows, hits at 0, place in the list.
+
+    `back` is -1 where a ray does not go through it, see `coincident.onward`.
+    """
+
+    rows: npt.NDArray[np.int64]
+    met: Meeting
+    back: npt.NDArray[np.int64]
+
+
+def _touching(form: Formed, engine: Engine, batch: Batch, chosen: Array, rays: _Rays) -> _Touch:
+    """Which rays start on a form that they have not just left."""
+    body, last = form.body, batch.last[chosen]
+    room = np.where(last >= 0, engine.grain[engine.owner[last]], 0.0) + 2.0 * engine.grain[form.surface]
+    rows = np.flatnonzero(_inside(form, rays.origin) & (rays.last < 0) & (rays.shift == 0.0))
+    some = rays.part(rows)
+    if isinstance(form.fit, LevelFit):
+        with np.errstate(all="ignore"):
+            value, gradient, _ = form.fit.form.level(some.origin, some.direction)
+            steep = np.sqrt(dot(gradient, gradient))
+            near = (np.abs(value) <= room[rows] * steep) & (steep > 0.0)
+            value = value / steep
+        rows, some, normal = rows[near], some.part(near), gradient[near] / steep[near, None]
+        face = _facet(form, some.origin, normal, REACH * form.fit.sag + START / body.frame[3])
+        kept = face >= 0
+        rows, some, normal, face = rows[kept], some.part(kept), normal[kept], face[kept]
+        place = some.origin - value[near][kept, None] * normal
+    else:
+        face = _facet(form, some.origin, some.direction, SIDES * form.side)
+        rows, some, face = rows[face >= 0], some.part(face >= 0), face[face >= 0]
+        rays.near[rows], rays.last[rows] = True, face
+        facet = form.body.planes[face, :3] * form.fit.along[face][:, None]
+        side = np.sign(dot(facet, some.direction))
+        there = form.fit.meet(some.origin, some.direction, np.zeros(len(rows)), side, face)
+        kept = np.abs(there.path) * np.abs(dot(there.normal, some.direction)) <= room[rows]
+        rows, place, normal, face = rows[kept], there.point[kept], there.normal[kept], there.face[kept]
+    on = form.fit.along[face] != 0
+    rows, met = rows[on], Meeting(np.zeros(on.sum()), place[on], normal[on], face[on])
+    return _Touch(rows, met, _onward(form, engine, batch, chosen[rows], met))
+
+
+def _inside(form: Formed, point: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which points (n, 3) are in the box around a form, little larger than it and its facets."""
+    body = form.body
+    local, room = (point - body.frame[:3]) * body.frame[3], REACH * form.fit.sag * body.frame[3]
+    return np.asarray(((local >= body.boxes[0][0] - room) & (local <= body.boxes[1][0] + room)).all(axis=1))
+
+
+def _facet(form: Formed, point: FloatArray, direction: FloatArray, reach: float) -> npt.NDArray[np.int64]:
+    """Facets (n,) of a form within `reach` of points, either way along directions; -1 where there is none."""
+    none, start = np.full(len(point), -1), point + reach * direction
+    return _first(form, start, -direction, none, np.full(len(point), 2.0 * reach))[1]
+
+
+def _onward(form: Formed, engine: Engine, batch: Batch, rows: Array, met: Meeting) -> npt.NDArray[np.int64]:
+    """Whether rays go through a form that they start on; see `coincident.onward`."""
+    came, direction = batch.came[rows], batch.state[rows, 3:6]
+    front = met.normal * form.fit.along[met.face][:, None]
+    facing = dot(front, direction)
+    source, solid = ~came.any(axis=1), form.body.closed or engine.sides[form.surface, 0] >= 0
+    toward = np.where(source, -1.0, dot(front, came))
+    back = np.zeros(len(rows), dtype=np.int64)
+    body, crossed = form.body, batch.crossed[rows]
+    for k in range(FIRST, COLUMNS):
+        known = (k < FIRST + crossed[:, COUNT]) & (crossed[:, k] >= body.first) & (crossed[:, k] < body.stop)
+        face = np.where(known, crossed[:, k] - body.first, 0)
+        back[known & (form.fit.along[face] != 0)] = k
+    onward = facing * toward * np.where(back > 0, -1.0, 1.0) > 0.0
+    return np.where(onward & (solid | ~source | (back > 0)), back, -1)
 
 
 def _first(form: Formed, start: FloatArray, direction: FloatArray, skip: Array, limit: Array) -> tuple[
@@ -114,8 +200,8 @@ def _first(form: Formed, start: FloatArray, direction: FloatArray, skip: Array, 
     body, tree = form.body, form.body.tree
     centre, scale = body.frame[:3], body.frame[3]
     path, face = exact.first_hits(
-        (start - centre) * scale, direction, skip, limit * scale, body.planes, tree.corners, tree.order,
-        tree.lower, tree.upper, body.frame[6],
+        (start - centre) * scale, direction, skip, limit * scale, body.planes,
+        (tree.corners, tree.order, tree.lower, tree.upper), body.frame[6],
     )  # fmt: skip
     return path / scale, face
 
@@ -197,7 +283,7 @@ def _between(form: Formed, rays: _Rays, best: Meeting) -> None:
         # a line crosses a quadric once in each sense: not again where it started, nor where it is found
         found = np.isfinite(best.path) & (form.fit.along[best.face] != 0)
         found &= np.einsum("ij,ij->i", best.normal, rays.direction) * sense > 0.0
-        untried = ~found if form.fit.complete else rays.own
+        untried = ~found if form.fit.complete else rays.near
         rows = np.flatnonzero(untried & ~(rays.own & (rays.leaving == sense)))
         if isinstance(form.fit, LevelFit) and form.fit.complete:
             rows = rows[_beside(form, form.fit, rays.part(rows), sense)]
@@ -266,23 +352,38 @@ def _passing(form: Formed, batch: Batch, rows: int, within: FloatArray) -> npt.N
 
 
 def _refined(
-    form: Formed, batch: Batch, rows: int, facets: Hits, within: FloatArray
-) -> tuple[Array, Meeting]:
-    """Rows of the batch that meet a form before they have gone `within` metres, and where."""
+    form: Formed, engine: Engine, batch: Batch, rows: int, facets: Hits, within: FloatArray
+) -> tuple[Array, Meeting, Array]:
+    """Rows of the batch that meet a form before they have gone `within` metres, where, and place in the list.
+
+    The place is that of the form in the list of faces crossed, where a ray starts on it.
+    """
     wanted = _passing(form, batch, rows, within)
     if not form.fit.complete:
         last = batch.last[:rows] - form.body.first
-        wanted &= ((last >= 0) & (last < len(form.body.faces))) | (facets.triangle[:rows] >= 0)
+        own = (last >= 0) & (last < len(form.body.faces))
+        wanted &= own | (facets.triangle[:rows] >= 0) | _inside(form, batch.state[:rows, :3])
     chosen = np.flatnonzero(wanted)
     rays = _seen(form, batch, chosen)
-    face, crossed = facets.triangle[chosen], facets.met[chosen, 0]
+    touch = _touching(form, engine, batch, chosen, rays)
+    # it is left already, or met at once
+    on, up = touch.rows, touch.met.normal
+    ahead = np.sign(dot(up, rays.direction[on]))
+    rays.own[on], rays.near[on], rays.last[on] = True, True, touch.met.face
+    rays.leaving[on], rays.up[on] = ahead, ahead[:, None] * up
+    face, crossed = facets.triangle[chosen], facets.met[chosen, 0] - rays.shift
     face = np.where(face >= 0, face - form.body.first, -1)
     best = _through_facets(form, rays, crossed, face)
     _between(form, rays, best)
     if not form.fit.complete:
         _hidden(form, rays, crossed, face, best)
-    hit = np.isfinite(best.path) & (best.path < within[chosen])
-    return chosen[hit], Meeting(*(column[hit] for column in vars(best).values()))
+    best.path[:] += rays.shift
+    at_once = touch.back >= 0
+    _keep(best, on[at_once], touch.met, at_once)
+    back = np.zeros(len(chosen), dtype=np.int64)
+    back[on[at_once]] = touch.back[at_once]
+    hit = np.isfinite(best.path)
+    return chosen[hit], Meeting(*(column[hit] for column in vars(best).values())), back[hit]
 
 
 def find(
@@ -292,6 +393,7 @@ def find(
     rows: int,
     hits: Hits,
     passed: frozenset[int] = frozenset(),
+    medium: Array | None = None,
 ) -> int:
     """Find the nearest hit of each ray, on the exact form where there is one, into `hits`.
 
@@ -300,7 +402,7 @@ def find(
     engine : Engine
         In which surfaces with a form have a body of their own.
     forms : tuple of Formed
-    batch, rows, hits, passed
+    batch, rows, hits, passed, medium
         See `fringetrace.tracing.intersect.embree.find`.
 
     Returns
@@ -308,22 +410,33 @@ def find(
     int
         How many rays were decided exactly.
     """
+    from fringetrace.tracing.intersect.kernels import preferred
+
     everything = frozenset(range(len(engine.offset)))
-    doubtful = find_facets(engine, batch, rows, hits, passed | {form.surface for form in forms})
-    facets = Hits.blank(rows)
+    doubtful = find_facets(engine, batch, rows, hits, passed | {form.surface for form in forms}, medium)
+    facets, contact = Hits.blank(rows), engine.contact(batch, medium)
+    crossed_back = batch.crossed[:rows, BACK].copy()
     for form in forms:
         if form.surface in passed:
             continue
-        doubtful += find_facets(engine, batch, rows, facets, everything - {form.surface})
-        chosen, met = _refined(form, batch, rows, facets, hits.met[:rows, 0])
-        face = met.face
-        along = form.fit.along[face]
-        hits.met[chosen, 0] = met.path
-        hits.met[chosen, 1:4] = met.point
-        hits.met[chosen, 4:7] = met.normal * np.where(along == 0, 1, along)[:, None]
-        local = (met.point - form.body.frame[:3]) * form.body.frame[3]
+        doubtful += find_facets(engine, batch, rows, facets, everything - {form.surface}, medium)
+        # no farther than what is met already, and as far where both may be at one place
+        within = hits.met[:rows, 0] * (1.0 + START) + START / form.body.frame[3]
+        chosen, met, back = _refined(form, engine, batch, rows, facets, within)
+        along = form.fit.along[met.face]
+        back = np.where((along == 0) & (met.path == 0.0), batch.crossed[chosen, BACK], back)
+        normal = met.normal * np.where(along == 0, 1, along)[:, None]
+        number = form.body.first + met.face
+        first = preferred(chosen, batch.state, hits.met, hits.triangle, contact, normal, number, met.path)
+        chosen, face, number = chosen[first], met.face[first], number[first]
+        hits.met[chosen, 0] = met.path[first]
+        hits.met[chosen, 1:4] = met.point[first]
+        hits.met[chosen, 4:7] = normal[first]
+        local = (met.point[first] - form.body.frame[:3]) * form.body.frame[3]
         edges = form.body.planes[face].reshape(-1, 4, 4)[:, 1:]
         inside = np.einsum("nek,nk->ne", edges[:, :, :3], local) + edges[:, :, 3]
         hits.met[chosen, 7] = inside.min(axis=1)
-        hits.triangle[chosen] = form.body.first + face
+        hits.triangle[chosen] = number
+        crossed_back[chosen] = back[first]
+    batch.crossed[:rows, BACK] = crossed_back
     return doubtful
