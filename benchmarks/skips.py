@@ -209,16 +209,16 @@ def dropped(side: int) -> Skip:
     def asked(find: Callable) -> Callable:
         first: list = []
 
-        def again(engine, batch, rows, hits, passed=frozenset()):
+        def again(engine, batch, rows, hits, passed=frozenset(), medium=None):
             if not (batch.bounces[:rows] == 0).all():
                 finished = first[0] - rows
                 if finished:
                     idle = part(first[1], slice(0, finished))
-                    find(engine, idle, finished, type(hits).blank(finished), passed)
+                    find(engine, idle, finished, type(hits).blank(finished), passed, medium)
             else:
                 kept = {name: column[:rows].copy() for name, column in batch._asdict().items()}
                 first[:] = [rows, type(batch)(**kept)]
-            return find(engine, batch, rows, hits, passed)
+            return find(engine, batch, rows, hits, passed, medium)
 
         return again
 
