@@ -25,6 +25,7 @@ from fringetrace.tracing.intersect.kernels import (  # fmt: skip
     NY,
     NZ,
     crossing,
+    crowded,
     restart,
     reviewed,
     unsure,
@@ -342,7 +343,10 @@ def rebound(
             k = np.uintp(guess)
             facing, inverted, path, px, py, pz, rim = crossing(planes, k, x, y, z, dx, dy, dz)
         doubt = unsure(guess, guess == last[row], path, facing, True, leaving, closed)
-        if doubt or rim <= MARGIN or edge < margin or crowds:
+        look = doubt or rim <= MARGIN or edge < margin
+        if crowds and not look:
+            look = (guess >= 0 and crowded(crowd, guess, px, py, pz)) or crowded(crowd, last[row], x, y, z)
+        if look:
             unclear, guess, (path, px, py, pz, rim), _ = reviewed(
                 (x, y, z, dx, dy, dz), (came[row, 0], came[row, 1], came[row, 2]),
                 (state[row, NX], state[row, NY], state[row, NZ]), last[row], leaving, edge, guess, facing,

@@ -9,7 +9,7 @@ the ray's medium on its near side comes last.
 
 from __future__ import annotations
 
-from fringetrace.core import jit
+from fringetrace.core import jit, lean
 
 # Columns of `crossed`: how many faces are listed, which of them is crossed back next (0: none), the list.
 COUNT, BACK, FIRST, COLUMNS = 0, 1, 2, 16
@@ -26,7 +26,7 @@ STRANGE = 5
 ONE, TWO, THREE = 0.6180339887, 0.5436890127, 0.5671432904
 
 
-@jit
+@lean
 def rank(sides, surface, medium, facing):
     """Place of a face in the order of faces at one point, for a ray in a medium that meets it from a side.
 
@@ -44,7 +44,7 @@ def rank(sides, surface, medium, facing):
     return 1 if front == 0 else 0
 
 
-@jit
+@lean
 def sooner(sides, medium, one, other):
     """Whether a ray meets one of two faces at the same place first.
 
@@ -62,13 +62,13 @@ def sooner(sides, medium, one, other):
     return (surface < other[0]) == upward
 
 
-@jit
+@lean
 def along(planes, tri, x, y, z):
     """Component of a vector along the normal of a triangle."""
     return planes[tri, 0] * x + planes[tri, 1] * y + planes[tri, 2] * z
 
 
-@jit
+@lean
 def onward(tri, left, facing, side, rim, came, row, contact, planes):
     """Whether a ray goes through a face that its start touches; -1: no, else where it is in the list, or 0.
 
@@ -104,7 +104,7 @@ def onward(tri, left, facing, side, rim, came, row, contact, planes):
     return 0 if region != 0 or facing * toward > 0.0 else -1
 
 
-@jit
+@lean
 def cross(crossed, row, triangle):
     """Enter a face that a ray goes through into its list, or take it off if the ray goes back through it."""
     count, back = crossed[row, COUNT], crossed[row, BACK]
@@ -122,7 +122,7 @@ def cross(crossed, row, triangle):
     crossed[row, COUNT] = count + 1
 
 
-@jit
+@lean
 def hand_on(crossed, row, to, triangle):
     """Hand the list of a row on to another, which goes through a triangle as well; -1: it is sent back."""
     for k in range(FIRST + crossed[row, COUNT]):

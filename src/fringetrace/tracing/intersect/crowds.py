@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import jit
+from fringetrace.core import jit, lean
 from fringetrace.tracing.intersect.exact import LEAF
 from fringetrace.tracing.intersect.kernels import MARGIN
 
@@ -12,7 +12,7 @@ from fringetrace.tracing.intersect.kernels import MARGIN
 FOLD = 1e-3
 
 
-@jit
+@lean
 def clipped(points, count, cut, nx, ny, nz, c):
     """Cut a polygon (the first `count` rows) down to n.p + c >= 0, into `cut`; how many corners it has."""
     kept = 0
@@ -32,28 +32,52 @@ def clipped(points, count, cut, nx, ny, nz, c):
     return kept
 
 
-@jit
+@lean
+def outside(corners, other, nx, ny, nz, c):
+    """Whether all corners of a triangle have n.p + c < 0."""
+    for k in (0, 3, 6):
+        if nx * corners[other, k] + ny * corners[other, k + 1] + nz * corners[other, k + 2] + c >= 0.0:
+            return False
+    return True
+
+
+@lean
+def bounding(planes, one, e):
+    """The e-th of five half-spaces n.p + c >= 0: `MARGIN` inside the edges of a triangle, about its plane."""
+    k, sign = (4 * e + 4, 1.0) if e < 3 else (0, 7.0 - 2.0 * e)
+    less = -MARGIN if e < 3 else MARGIN
+    return (
+        sign * planes[one, k],
+        sign * planes[one, k + 1],
+        sign * planes[one, k + 2],
+        (sign * planes[one, k + 3] + less),
+    )
+
+
+@lean
 def close(planes, corners, one, other, points, cut):
     """Whether a triangle comes near to another, farther than `MARGIN` from the edges of that.
 
     `points` and `cut` are room for 9 corners.
     """
+    for e in range(5):  # most are beyond one of them
+        nx, ny, nz, c = bounding(planes, one, e)
+        if outside(corners, other, nx, ny, nz, c):
+            return False
     count = 3
     for i in range(3):
         for axis in range(3):
             points[i, axis] = corners[other, 3 * i + axis]
-    for e in (4, 8, 12, 0, 16):
-        sign = -1.0 if e == 16 else 1.0
-        k, less = e % 16, -MARGIN if e in (4, 8, 12) else MARGIN
-        nx, ny, nz = sign * planes[one, k], sign * planes[one, k + 1], sign * planes[one, k + 2]
-        count = clipped(points, count, cut, nx, ny, nz, sign * planes[one, k + 3] + less)
+    for e in range(5):
+        nx, ny, nz, c = bounding(planes, one, e)
+        count = clipped(points, count, cut, nx, ny, nz, c)
         if count == 0:
             return False
         points, cut = cut, points
     return True
 
 
-@jit
+@lean
 def folded(planes, one, other):
     """Whether two faces that share an edge lie on one another."""
     cosine = 0.0
@@ -62,54 +86,86 @@ def folded(planes, one, other):
     return cosine < 0.0 and 1.0 - cosine * cosine < FOLD * FOLD
 
 
+@lean
+def extent(corners, tri, room, box, row):
+    """Write the box of a triangle, larger by `room` on all sides, into a row of a table."""
+    for k in range(3):
+        box[row, k] = min(corners[tri, k], corners[tri, k + 3], corners[tri, k + 6]) - room
+        box[row, k + 3] = max(corners[tri, k], corners[tri, k + 3], corners[tri, k + 6]) + room
+
+
+@lean
+def apart(one, i, other, k):
+    """Whether two boxes, rows of tables, have no point in common."""
+    far = False
+    for axis in range(3):
+        far |= one[i, axis] > other[k, axis + 3] or other[k, axis] > one[i, axis + 3]
+    return far
+
+
+@lean
+def gather(lower, upper, leaf, stack, found):
+    """List the leaves of the tree that come within `MARGIN` of a node; how many, or -1: `found` is full."""
+    leaves, count, depth = len(lower) // 2, 0, 1
+    stack[0] = 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        far = False
+        for k in range(3):
+            far |= lower[node, k] > upper[leaf, k] + MARGIN or upper[node, k] < lower[leaf, k] - MARGIN
+        if far:
+            continue
+        if node < leaves:
+            stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
+            depth += 2
+            continue
+        if count == len(found):
+            return -1
+        found[count] = node - leaves
+        count += 1
+    return count
+
+
 @jit
 def near(planes, corners, order, lower, upper, beside):
     """For each triangle the box (t, 6) of where others are near to it; from infinity on where none is.
 
     `beside` (t, 3) are the triangles across its edges.
     """
-    count, leaves = len(planes), len(lower) // 2
-    boxes = np.empty((count, 6))
-    stack = np.empty(64, np.int64)
-    low, high = np.empty(3), np.empty(3)
+    boxes, leaves = np.empty((len(planes), 6)), len(lower) // 2
+    stack, found = np.empty(64, np.int64), np.empty(64, np.int64)
+    mine, theirs = np.empty((LEAF, 6)), np.empty((1, 6))
     points, cut = np.empty((9, 3)), np.empty((9, 3))
-    for tri in range(count):
-        for k in range(3):
-            low[k] = min(corners[tri, k], corners[tri, k + 3], corners[tri, k + 6]) - MARGIN
-            high[k] = max(corners[tri, k], corners[tri, k + 3], corners[tri, k + 6]) + MARGIN
-            boxes[tri, k], boxes[tri, k + 3] = np.inf, -np.inf
-        stack[0] = 1
-        depth = 1
-        while depth > 0:
-            depth -= 1
-            node = stack[depth]
-            apart = False
+    for leaf in range(leaves):
+        for i in range(LEAF):
+            tri = np.int64(order[LEAF * leaf + i])
+            if tri < 0:
+                continue
+            extent(corners, tri, MARGIN, mine, i)
             for k in range(3):
-                apart |= lower[node, k] > high[k] or upper[node, k] < low[k]
-            if apart:
+                boxes[tri, k], boxes[tri, k + 3] = np.inf, -np.inf
+        count = gather(lower, upper, leaves + leaf, stack, found)
+        while count < 0:
+            found = np.empty(2 * len(found), np.int64)
+            count = gather(lower, upper, leaves + leaf, stack, found)
+        for slot in range(LEAF * count):
+            other = np.int64(order[LEAF * found[slot // LEAF] + slot % LEAF])
+            if other < 0:
                 continue
-            if node < leaves:
-                stack[depth], stack[depth + 1] = 2 * node, 2 * node + 1
-                depth += 2
-                continue
-            for slot in range(LEAF * (node - leaves), LEAF * (node - leaves) + LEAF):
-                other = np.int64(order[slot])
-                if other < 0 or other == tri:
+            extent(corners, other, 0.0, theirs, 0)
+            for i in range(LEAF):
+                tri = np.int64(order[LEAF * leaf + i])
+                if tri < 0 or tri == other or apart(mine, i, theirs, 0):
                     continue
                 joined = other == beside[tri, 0] or other == beside[tri, 1] or other == beside[tri, 2]
-                if joined and not folded(planes, tri, other):
-                    continue
-                if not close(planes, corners, tri, other, points, cut):
+                if (joined and not folded(planes, tri, other)) or not close(
+                    planes, corners, tri, other, points, cut
+                ):
                     continue
                 for k in range(3):
-                    boxes[tri, k] = min(
-                        boxes[tri, k],
-                        min(corners[other, k], corners[other, k + 3], corners[other, k + 6]) - 2.0 * MARGIN,
-                    )
-                    boxes[tri, k + 3] = max(
-                        boxes[tri, k + 3],
-                        max(corners[other, k], corners[other, k + 3], corners[other, k + 6]) + 2.0 * MARGIN,
-                    )
+                    boxes[tri, k] = min(boxes[tri, k], theirs[0, k] - 2.0 * MARGIN)
+                    boxes[tri, k + 3] = max(boxes[tri, k + 3], theirs[0, k + 3] + 2.0 * MARGIN)
     return boxes
 
 

@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace.core import jit, part
+from fringetrace.core import jit, lean, part
 from fringetrace.tracing.intersect.coincident import SEAM, SHEET, onward, sooner
 
 # Flatter to a face than this (cosine) no crack beside it is looked for.
 FLAT = 0.01
 # A ray slides along a face, and does not cross it, if its cosine to the normal is under so many roundings.
 SLIDE = 64.0
+# What a ray does with a triangle: passes it, meets it, or passes it by no more than roundings.
+MISSED, MET, CRACK = 0, 1, 2
 # Triangles in a leaf of the tree.
 LEAF = 4
 
@@ -86,7 +88,7 @@ def permute(x, y, z, axis):
     return x, y, z
 
 
-@jit
+@lean
 def crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
     """Watertight line-triangle test: both sides of a shared edge decide alike.
 
@@ -116,7 +118,7 @@ def inset(planes, tri, x, y, z):
     return least if least < c else c
 
 
-@jit
+@lean
 def hidden(planes, corners, tri, left, dx, dy, dz, tolerance):
     """Whether a triangle lies wholly on the other side of the plane of `left` than the ray that leaves this.
 
@@ -153,6 +155,59 @@ def inverse(component):
     return 1.0 / component if abs(component) > 1e-200 else 1e200
 
 
+@part
+def sheared(dx, dy, dz):
+    """Axis that a direction is most along, and its slopes against that, as `crosses` takes them."""
+    magnitude = max(abs(dx), abs(dy), abs(dz))
+    axis = 0 if abs(dx) == magnitude else (1 if abs(dy) == magnitude else 2)
+    px, py, pz = permute(dx, dy, dz, axis)
+    return axis, px / pz, py / pz
+
+
+@lean
+def descend(lower, upper, node, x, y, z, ix, iy, iz, nearest, stack, depth):
+    """Put those children of a node that a ray enters on the stack, the nearer one on top; its new depth."""
+    left = enters(lower, upper, 2 * node, x, y, z, ix, iy, iz, nearest)
+    right = enters(lower, upper, 2 * node + 1, x, y, z, ix, iy, iz, nearest)
+    near = 2 * node if left <= right else 2 * node + 1
+    if max(left, right) < np.inf:
+        stack[depth] = 4 * node + 1 - near
+        depth += 1
+    if min(left, right) < np.inf:
+        stack[depth] = near
+        depth += 1
+    return depth
+
+
+@lean
+def tried(ray, sheer, tri, skip, nearest, side, came, row, contact, planes, corners, tolerance):
+    """What a ray does with a triangle (`MISSED`, `MET`, `CRACK`), path, its rounding, cosine, and back.
+
+    `back` is the place of the triangle in the list of faces that the ray has crossed, see `coincident`.
+    """
+    x, y, z, dx, dy, dz = ray
+    height = planes[tri, 0] * x + planes[tri, 1] * y + planes[tri, 2] * z + planes[tri, 3]
+    facing = planes[tri, 0] * dx + planes[tri, 1] * dy + planes[tri, 2] * dz
+    here = side != 2 and abs(height) <= tolerance
+    aside = inset(planes, tri, x, y, z) if here else -np.inf
+    if aside >= -tolerance:
+        back = onward(tri, skip, facing, side, aside <= SEAM, came, row, contact, planes)
+        if back < 0 or (skip >= 0 and hidden(planes, corners, tri, skip, dx, dy, dz, tolerance)):
+            return MISSED, 0.0, 0.0, facing, 0
+        return MET, 0.0, 0.0, facing, back
+    if abs(facing) < SLIDE * tolerance:
+        return MISSED, 0.0, 0.0, facing, 0
+    path, tie = -height / facing, 2.0 * tolerance / abs(facing)
+    if not (path > 0.0 and nearest > 0.0 and path <= nearest + tie):
+        return MISSED, path, tie, facing, 0
+    if crosses(corners, tri, x, y, z, sheer[0], sheer[1], sheer[2]):
+        return MET, path, tie, facing, 0
+    if contact[7] or here or (abs(side) == 1 and facing * side >= 0.0):  # a closed body has no cracks
+        return MISSED, path, tie, facing, 0
+    aside = inset(planes, tri, x + path * dx, y + path * dy, z + path * dz)
+    return (CRACK if aside >= -tolerance / max(abs(facing), FLAT) else MISSED), path, tie, facing, 0
+
+
 @jit
 def decide(ray, skip, guess, limit, side, came, row, contact, planes, tree, tolerance):
     """First hit of a ray in float64: path length, triangle, place in the list of faces crossed.
@@ -165,13 +220,9 @@ def decide(ray, skip, guess, limit, side, came, row, contact, planes, tree, tole
     x, y, z, dx, dy, dz = ray
     owner, sides, medium, first = contact[0], contact[1], contact[3][row], contact[5]
     corners, order, lower, upper = tree
-    magnitude = max(abs(dx), abs(dy), abs(dz))
-    axis = 0 if abs(dx) == magnitude else (1 if abs(dy) == magnitude else 2)
-    px, py, pz = permute(dx, dy, dz, axis)
-    shear_x, shear_y = px / pz, py / pz
-    ix, iy, iz = inverse(dx), inverse(dy), inverse(dz)
+    sheer, ix, iy, iz = sheared(dx, dy, dz), inverse(dx), inverse(dy), inverse(dz)
     nearest, best, best_back = limit, np.int64(-1), 0
-    beside, rim, cracks = limit, np.int64(-1), not contact[7]
+    beside, rim = limit, np.int64(-1)
     hit: Any = (np.int64(0), 0.0, (0.0, 0.0, 0.0), limit, np.int64(-1))
     leaves = len(lower) // 2
     stack = np.empty(64, np.int64)
@@ -188,15 +239,7 @@ def decide(ray, skip, guess, limit, side, came, row, contact, planes, tree, tole
             if enters(lower, upper, node, x, y, z, ix, iy, iz, nearest) == np.inf:
                 continue
             if node < leaves:
-                left = enters(lower, upper, 2 * node, x, y, z, ix, iy, iz, nearest)
-                right = enters(lower, upper, 2 * node + 1, x, y, z, ix, iy, iz, nearest)
-                near = 2 * node if left <= right else 2 * node + 1
-                if max(left, right) < np.inf:
-                    stack[depth] = 4 * node + 1 - near
-                    depth += 1
-                if min(left, right) < np.inf:
-                    stack[depth] = near
-                    depth += 1
+                depth = descend(lower, upper, node, x, y, z, ix, iy, iz, nearest, stack, depth)
                 continue
             begin = LEAF * (node - leaves)
             end = begin + LEAF
@@ -204,36 +247,19 @@ def decide(ray, skip, guess, limit, side, came, row, contact, planes, tree, tole
             tri = guess if start else np.int64(order[slot])
             if tri < 0 or tri == skip:
                 continue
-            nx, ny, nz = planes[tri, 0], planes[tri, 1], planes[tri, 2]
-            height = nx * x + ny * y + nz * z + planes[tri, 3]
-            facing = nx * dx + ny * dy + nz * dz
-            back, tie = 0, 0.0
-            aside = inset(planes, tri, x, y, z) if side != 2 and abs(height) <= tolerance else -np.inf
-            if aside >= -tolerance:
-                back = onward(tri, skip, facing, side, aside <= SEAM, came, row, contact, planes)
-                if back < 0 or (skip >= 0 and hidden(planes, corners, tri, skip, dx, dy, dz, tolerance)):
-                    continue
-                path = 0.0
-            else:
-                if abs(facing) < SLIDE * tolerance:
-                    continue
-                path = -height / facing
-                tie = 2.0 * tolerance / abs(facing)
-                if not (path > 0.0 and nearest > 0.0 and path <= nearest + tie):
-                    continue
-                if not crosses(corners, tri, x, y, z, axis, shear_x, shear_y):
-                    here = side != 2 and abs(height) <= tolerance
-                    if cracks and not here and (abs(side) != 1 or facing * side < 0.0):
-                        aside = inset(planes, tri, x + path * dx, y + path * dy, z + path * dz)
-                        first_there = path < beside - tie or (path <= beside + tie and facing < 0.0)
-                        if aside >= -tolerance / max(abs(facing), FLAT) and first_there:
-                            beside, rim = path, tri
-                    continue
-            found = (np.int64(owner[first + tri]), facing, (nx, ny, nz), path, tri)
-            if path < nearest - tie or (
-                path <= nearest + tie and (path < nearest if best < 0 else sooner(sides, medium, found, hit))
-            ):
-                nearest, best, best_back, hit = path, tri, back, found
+            what, path, tie, facing, back = tried(
+                ray, sheer, tri, skip, nearest, side, came, row, contact, planes, corners, tolerance
+            )
+            if what == CRACK:
+                if path < beside - tie or (path <= beside + tie and facing < 0.0):
+                    beside, rim = path, tri
+            elif what == MET and path <= nearest + tie:
+                normal = planes[tri, 0], planes[tri, 1], planes[tri, 2]
+                found = (np.int64(owner[first + tri]), facing, normal, path, tri)
+                if path < nearest - tie or (
+                    path < nearest if best < 0 else sooner(sides, medium, found, hit)
+                ):
+                    nearest, best, best_back, hit = path, tri, back, found
         start = False
     if rim >= 0 and beside < nearest - 64.0 * tolerance:
         return beside, rim, 0

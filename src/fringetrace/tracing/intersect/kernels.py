@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fringetrace.core import jit, part
+from fringetrace.core import jit, lean, part
 from fringetrace.tracing.intersect.coincident import BACK, sooner
 from fringetrace.tracing.intersect.exact import decide, enters, inset, inverse
 
@@ -122,7 +122,7 @@ def aim(
     return count
 
 
-@jit
+@lean
 def softly(planes, tri, x, y, z, folds, margin):
     """Whether all edges of a triangle within `margin` of a point have gentle folds (bits)."""
     for k in range(3):
@@ -159,7 +159,7 @@ def unsure(guess, again, path, facing, own, leaving, closed):
     return (not measurable) | (own & (again | (closed & (facing * leaving >= 0.0))))
 
 
-@jit
+@lean
 def clamped(planes, tri, x, y, z):
     """Point moved back inside the edges of a triangle, and how far inside it was."""
     rim = np.inf
@@ -214,7 +214,7 @@ def decided(ray, came, normal, left, leaving, guess, limit, row, contact, body):
     return tri, (start + path, x, y, z, rim), back
 
 
-@jit
+@lean
 def crowded(crowd, tri, x, y, z):
     """Whether a point of a triangle is where others are near it that share no edge with it."""
     if crowd[tri, 0] > x or crowd[tri, 1] > y or crowd[tri, 2] > z:
@@ -255,7 +255,7 @@ def reviewed(ray, came, normal, left, leaving, edge, guess, facing, hit, doubt, 
     return True, guess, hit, 0
 
 
-@jit
+@lean
 def nearer(state, row, met, triangle, contact, normal, facing, number, path):
     """Whether a hit comes before the one in `met`: at the same place the faces decide, not the rounding.
 
@@ -300,6 +300,7 @@ def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
     first, stop, _, closed, frame, planes, _, crowd, _ = body
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
     unscale, margin, many = 1.0 / scale, frame[5], len(crowd) > 0
+    crossed, slack = contact[4], 2.0 * contact[2].max()
     doubtful = 0
     for i in range(count):
         row = np.uintp(sent[i])
@@ -321,7 +322,12 @@ def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
             k = np.uintp(guess)
             facing, _, path, px, py, pz, rim = crossing(planes, k, x, y, z, dx, dy, dz)
         doubt = unsure(guess, guess == left, path, facing, own, leaving, closed)
-        if doubt or rim <= MARGIN or edge < margin or many:
+        look = doubt or rim <= MARGIN or edge < margin
+        if many and not look:
+            look = (guess >= 0 and crowded(crowd, guess, px, py, pz)) or (
+                left >= 0 and crowded(crowd, left, x, y, z)
+            )
+        if look:
             unclear, guess, (path, px, py, pz, rim), back = reviewed(
                 (x, y, z, dx, dy, dz), (came[row, 0], came[row, 1], came[row, 2]), (nx, ny, nz), left,
                 leaving, edge, guess, facing, (path, px, py, pz, rim), doubt, row, contact, body,
@@ -332,13 +338,15 @@ def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
         # rounding left the point a little off its plane: put it back
         k = np.uintp(guess)
         nx, ny, nz = planes[k, 0], planes[k, 1], planes[k, 2]
-        if met[row, PATH] < np.inf and not nearer(
-            state, row, met, triangle, contact, (nx, ny, nz), nx * dx + ny * dy + nz * dz, first + guess,
-            path * unscale,
-        ):  # fmt: skip
+        length, other, facing = path * unscale, met[row, PATH], nx * dx + ny * dy + nz * dz
+        if length >= other and (length - other) * abs(facing) > slack + TIE * length and other > 0.0:
+            continue  # as `nearer` says, at less cost
+        if other < np.inf and not nearer(
+            state, row, met, triangle, contact, (nx, ny, nz), facing, first + guess, length
+        ):
             continue
         if path == 0.0:
-            contact[4][row, BACK] = back
+            crossed[row, BACK] = back
         height = nx * px + ny * py + nz * pz + planes[k, 3]
         triangle[row] = first + guess
         met[row, PATH], met[row, RIM] = path * unscale, rim
