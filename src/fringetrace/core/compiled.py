@@ -18,9 +18,9 @@ jit: Any = njit(**COMPILED)
 
 # Makes no array, and counts no references to those it is given: a count is an atomic operation, which takes
 # as long as the test of a box, and longer where threads share the array.
-lean: Any = njit(**COMPILED, _nrt=False)
+lean: Any = njit(**COMPILED | {"_nrt": False})
 
-part: Any = njit(**COMPILED, forceinline=True)
+part: Any = njit(**COMPILED | {"forceinline": True})
 
 
 @jit
