@@ -410,6 +410,8 @@ class _Judge:
             medium[rows] = np.where(boundary, beyond, medium[rows])
             back = np.array([s.interface is BACK for s in scene.surfaces])[surface]
             direction[rows[back]] -= 2.0 * facing[back, None] * normal[back]
+        if all(len(surface.mesh.faces) == 2 for surface in scene.surfaces):  # light gets in from the side
+            wrong &= paths.bounces >= len(scene.surfaces)
         for row in np.flatnonzero(wrong):  # past the edge of something that it should have met
             room = 64.0 * self.tight + self.loose[row]
             height, inside = self.faces.heights(self.points[row, : paths.bounces[row] + 1])
