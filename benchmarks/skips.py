@@ -96,7 +96,7 @@ def altered(scene: ft.Scene, change: Callable) -> ft.Scene:
 
 def tracing(scene: ft.Scene, beam: ft.Beam, ccd: ft.CCD | None = None) -> Callable:
     """A trace on one thread, to be called."""
-    return lambda: columns(ft.trace(scene, beam, ccd, threads=1))
+    return lambda: columns(ft.trace(scene, beam, ccd, threads=1, warn=False))
 
 
 def rods(side: int, open_: bool = False) -> tuple[ft.Scene, ft.Beam]:
@@ -209,16 +209,16 @@ def dropped(side: int) -> Skip:
     def asked(find: Callable) -> Callable:
         first: list = []
 
-        def again(engine, batch, rows, hits, passed=frozenset()):
+        def again(engine, batch, rows, hits, passed=frozenset(), medium=None):
             if not (batch.bounces[:rows] == 0).all():
                 finished = first[0] - rows
                 if finished:
                     idle = part(first[1], slice(0, finished))
-                    find(engine, idle, finished, type(hits).blank(finished), passed)
+                    find(engine, idle, finished, type(hits).blank(finished), passed, medium)
             else:
                 kept = {name: column[:rows].copy() for name, column in batch._asdict().items()}
                 first[:] = [rows, type(batch)(**kept)]
-            return find(engine, batch, rows, hits, passed)
+            return find(engine, batch, rows, hits, passed, medium)
 
         return again
 
@@ -236,7 +236,7 @@ def unrecorded(side: int) -> Skip:
     scene, beam = rods(side)
 
     def recorded() -> list[np.ndarray]:
-        return columns(ft.trace(scene, beam, threads=1, record=True))
+        return columns(ft.trace(scene, beam, threads=1, record=True, warn=False))
 
     return Skip("polylines only when asked for", "80 rods in a box", tracing(scene, beam), recorded)
 
@@ -290,7 +290,7 @@ def differences(side: int) -> Skip:
     bench = ft.instruments.michelson(
         flat.moved(turn=turn), aperture=6 * mm, pixels=(pixels, pixels), reference_tilt=(tilt, 0.0)
     )
-    paths = ft.trace(bench.scene, replace(bench.beam, shape=(12, 12)), bench.ccd)
+    paths = ft.trace(bench.scene, replace(bench.beam, shape=(12, 12)), bench.ccd, warn=False)
 
     def image() -> list[np.ndarray]:
         return [ft.irradiance(paths, WAVE, "wavefront")]
@@ -351,13 +351,13 @@ def unreached(side: int) -> Skip:
     beam = ft.Beam((0, 0, 20 * mm), (0, 0, -1), (0, 1, 0), (4 * mm, 4 * mm), (side, side))
 
     def fresh() -> list[np.ndarray]:
-        return columns(ft.trace(ft.Scene(surfaces), beam, threads=1))
+        return columns(ft.trace(ft.Scene(surfaces), beam, threads=1, warn=False))
 
     def built() -> list[np.ndarray]:
         scene = ft.Scene(surfaces)
         for body in build(scene).bodies:
             body.prepare()
-        return columns(ft.trace(scene, beam, threads=1))
+        return columns(ft.trace(scene, beam, threads=1, warn=False))
 
     return Skip("bodies that no ray gets near are not built", "a ball beside a plate", fresh, built)
 
@@ -372,7 +372,7 @@ def slab(side: int, index: complex = 1.5, jones: tuple | None = None) -> Callabl
     beam = ft.Beam(
         -5 * mm * way, way, (1, 0, 0), (2 * mm, 2 * mm), (side // 2, side // 2), polarisation=jones
     )
-    return lambda: columns(ft.trace(scene, beam, wavelength=WAVE, threads=1))
+    return lambda: columns(ft.trace(scene, beam, wavelength=WAVE, threads=1, warn=False))
 
 
 def scalar(side: int) -> Skip:
@@ -401,7 +401,7 @@ def vacuum(side: int) -> Skip:
     immersed = ft.Scene(scene.surfaces, medium=ft.materials.constant(1.0 + 1e-300j))
 
     def through() -> list[np.ndarray]:
-        return columns(ft.trace(immersed, beam, wavelength=WAVE, threads=1))
+        return columns(ft.trace(immersed, beam, wavelength=WAVE, threads=1, warn=False))
 
     return Skip("mirrors in a vacuum: no media", "80 rods in a box", tracing(scene, beam), through)
 
@@ -416,7 +416,7 @@ def extruded(side: int) -> Skip:
 
     def image(rows: int) -> Callable:
         beam = ft.Beam((0, 0, 10 * mm), (0, 0, -1), (0, 1, 0), size, (rows, 64))
-        return lambda: [ft.irradiance(ft.trace(scene, beam, ccd, threads=1), WAVE, "wavefront")]
+        return lambda: [ft.irradiance(ft.trace(scene, beam, ccd, threads=1, warn=False), WAVE, "wavefront")]
 
     return Skip("extruded scene: one row of rays, swept", "a step", image(1), image(64))
 

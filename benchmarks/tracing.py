@@ -88,15 +88,15 @@ def bouncing(make, side: int) -> dict:
     """12 bounces among mirrors, on one thread and on two."""
     scene, beam = make()
     beam = replace(beam, shape=(side, side))
-    paths = ft.trace(scene, beam, record=True)
+    paths = ft.trace(scene, beam, record=True, warn=False)
     assert paths.ledger().error < 1e-12
     return compare(
         make.__name__,
         scene,
         paths,
         {
-            "1 thread": lambda: ft.trace(scene, beam, threads=1),
-            "2 threads": lambda: ft.trace(scene, beam, threads=2),
+            "1 thread": lambda: ft.trace(scene, beam, threads=1, warn=False),
+            "2 threads": lambda: ft.trace(scene, beam, threads=2, warn=False),
         },
     )
 
@@ -112,7 +112,7 @@ def matter(side: int) -> dict:
     assert paths.ledger().error < 1e-12
 
     def run(scene: ft.Scene, beam: ft.Beam):
-        return lambda: ft.trace(scene, beam, wavelength=600e-9, min_amplitude=0.0, threads=1)
+        return lambda: ft.trace(scene, beam, wavelength=600e-9, min_amplitude=0.0, threads=1, warn=False)
 
     return compare(
         "matter",

@@ -572,5 +572,7 @@ class _Judge:
 def tried(seed: int, count: int = 1000, kind: str | None = None) -> tuple[Case, ft.Paths, list[str]]:
     """Trace a case and judge it."""
     some = case(seed, count, kind)
-    paths = ft.trace(some.scene, some.rays, max_bounces=some.depth, min_amplitude=0.0, record=True, threads=1)
+    paths = ft.trace(
+        some.scene, some.rays, max_bounces=some.depth, min_amplitude=0.0, record=True, threads=1, warn=False
+    )
     return some, paths, judge(some, paths)

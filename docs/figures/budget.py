@@ -155,7 +155,7 @@ def hit_plates() -> Iterator[Row]:
         beam = ft.Beam(turn @ start, turn @ into, turn @ (0, 1, 0), (1 * mm, 1 * mm), (7, 7))
         end = turn @ np.array([0.5 * long + 2 * gap, 0.0, 0.5 * gap])
         ccd = ft.CCD(end, turn @ (-1.0, 0.0, 0.0), turn @ (0, 1, 0), 1 * mm, (100, 100))
-        paths = ft.trace(scene, beam, ccd, max_bounces=2 * bounces, record=True)
+        paths = ft.trace(scene, beam, ccd, max_bounces=2 * bounces, record=True, warn=False)
         yield hit_row(f"{int(paths.detected.bounces.max())} bounces", paths, 1 if bounces < 1000 else 7)
 
 

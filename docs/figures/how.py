@@ -40,7 +40,7 @@ def section(axes: Any) -> None:
     scene, _, ccd = bowl(1)
     starts = np.linspace(-3.4 * mm, 3.4 * mm, 35)
     rays = ft.Rays([(x, 0, 0) for x in starts], [(0, 0, 1)] * len(starts))
-    paths = ft.trace(scene, rays, max_bounces=1, record=True)
+    paths = ft.trace(scene, rays, max_bounces=1, record=True, warn=False)
     for row in range(len(paths)):
         line = paths.polyline(row)
         if paths.fate[row] == ft.Fate.ABSORBED:
@@ -62,7 +62,7 @@ def section(axes: Any) -> None:
 def grid(axes: Any) -> None:
     """The beam's grid; each ray has the colour of what it met."""
     scene, beam, ccd = bowl(24)
-    paths = ft.trace(scene, beam, ccd, max_bounces=1)
+    paths = ft.trace(scene, beam, ccd, max_bounces=1, warn=False)
     reflected = np.zeros(24 * 24, dtype=bool)
     reflected[paths.ray[paths.fate != ft.Fate.ABSORBED]] = True
     centres = (np.arange(24) - 11.5) * 6.8 / 24
@@ -78,7 +78,7 @@ def grid(axes: Any) -> None:
 def folded(axes: Any) -> None:
     """The same cells where they arrive: a sheet, folded along the caustic."""
     scene, beam, ccd = bowl(72)
-    (sheet,) = sheets(ft.trace(scene, beam, ccd, max_bounces=1, record=True))
+    (sheet,) = sheets(ft.trace(scene, beam, ccd, max_bounces=1, record=True, warn=False))
     x, y = (200 - sheet.x) * 0.5, (sheet.y - 200) * 0.5
     for turned, colour, label in (
         (False, BLUE, "has passed no caustic"),

@@ -109,7 +109,7 @@ def compared(slope: float, rays: int = 20, seed: int = 5) -> Row:
     start = np.stack([rng.uniform(-1, 1, rays) * nm, np.zeros(rays), np.full(rays, LIFT)], axis=1)
     tilt = slope * rng.uniform(0.5, 1.5, rays) * rng.choice([-1, 1], rays)
     direction = np.stack([np.ones(rays), np.zeros(rays), tilt], axis=1)
-    paths = ft.trace(discs(), ft.Rays(start, direction), max_bounces=MOST, record=True)
+    paths = ft.trace(discs(), ft.Rays(start, direction), max_bounces=MOST, record=True, warn=False)
     bound = ft.bounds(paths).position
     figures = []
     with mpmath.workdps(DIGITS):

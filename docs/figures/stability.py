@@ -132,7 +132,7 @@ def needles():
         [rng.uniform(-50, 50, count) * um, rng.uniform(-0.4, 0.4, count), 0.005 * np.ones(count)], axis=1
     )
     along = np.stack([rng.normal(0, 5e-5, count), rng.normal(0, 0.2, count), -np.ones(count)], axis=1)
-    paths = ft.trace(scene, ft.Rays(start @ TILT.T, along @ TILT.T), max_bounces=10, record=True)
+    paths = ft.trace(scene, ft.Rays(start @ TILT.T, along @ TILT.T), max_bounces=10, record=True, warn=False)
     return Figure(count, worst_length(paths, range(0, count, 20)), int((paths.bounces != 10).sum()))
 
 
@@ -143,7 +143,7 @@ def far_away():
     mesh = inverted(shapes.icosphere(1 * mm, 2)).moved(place)
     start = rng.uniform(-0.3, 0.3, (400, 3)) * mm + place
     rays = ft.Rays(start, directions(rng, 400))
-    paths = ft.trace(ft.Scene([ft.Surface(mesh, MIRROR)]), rays, max_bounces=8, record=True)
+    paths = ft.trace(ft.Scene([ft.Surface(mesh, MIRROR)]), rays, max_bounces=8, record=True, warn=False)
     return Figure(400, worst_length(paths, range(0, 400, 8)), int((paths.bounces != 8).sum()))
 
 
@@ -176,7 +176,9 @@ def many_bounces():
     rng = np.random.default_rng(5)
     start = np.concatenate([rng.uniform(-0.01, 0.01, (200, 2)), np.full((200, 1), 0.3 * gap)], axis=1)
     along = np.concatenate([rng.normal(0, 0.02, (200, 2)), -np.ones((200, 1))], axis=1)
-    paths = ft.trace(scene, ft.Rays(start @ TILT.T, along @ TILT.T), max_bounces=1000, record=True)
+    paths = ft.trace(
+        scene, ft.Rays(start @ TILT.T, along @ TILT.T), max_bounces=1000, record=True, warn=False
+    )
     return Figure(200, worst_length(paths, range(0, 200, 20)), int((paths.bounces != 1000).sum()))
 
 
@@ -187,8 +189,8 @@ def vertices_and_edges():
     goals = np.concatenate([mesh.vertices, 0.5 * (corners[:, 0] + corners[:, 1])])
     start = np.tile([0.1, 0.2, -0.05], (len(goals), 1))
     scene = ft.Scene([ft.Surface(mesh, MIRROR)])
-    once = ft.trace(scene, ft.Rays(start, goals - start), max_bounces=1)
-    often = ft.trace(scene, ft.Rays(start, goals - start), max_bounces=30)
+    once = ft.trace(scene, ft.Rays(start, goals - start), max_bounces=1, warn=False)
+    often = ft.trace(scene, ft.Rays(start, goals - start), max_bounces=30, warn=False)
     worst = 0.0
     with mpmath.workdps(50):
         for a, b, length in zip(goals, start, once.length, strict=True):
@@ -207,7 +209,7 @@ def along_edges():
         for y in (-inset, 0.0, inset):
             start += [(x, y, 0.25), (0.25, x, y), (y, 0.25, x)]
             along += [(0, 0, -1), (-1, 0, 0), (0, -1, 0)]
-    paths = ft.trace(scene, ft.Rays(start, along), max_bounces=101)
+    paths = ft.trace(scene, ft.Rays(start, along), max_bounces=101, warn=False)
     expected = 0.75 + 100.0
     return Figure(
         len(start), float(np.abs(paths.length - expected).max() / WAVE), int((paths.bounces != 101).sum())
@@ -257,7 +259,7 @@ def gaps():
             ft.Surface(flat, MIRROR, "flat"),
         ]
         rays = ft.Rays(start, np.tile([0.0, 0.0, -1.0], (count, 1)))
-        paths = ft.trace(ft.Scene(surfaces), rays, max_bounces=2, record=True)
+        paths = ft.trace(ft.Scene(surfaces), rays, max_bounces=2, record=True, warn=False)
         through = (paths.surface[:, 0] == 0) & (paths.surface[:, 1] == 1)
         astray += count - int(through.sum())
         met = paths.where(through)
@@ -324,7 +326,7 @@ def whispering():
     cosine = 10.0 ** rng.uniform(-5.0, 0.0, count)
     along = np.sqrt(1.0 - cosine**2)[:, None] * tangent - cosine[:, None] * spoke
     ball = ft.Surface(inverted(shapes.icosphere(1.0, 3)), MIRROR, form=forms.Sphere((0, 0, 0), 1.0))
-    paths = ft.trace(ft.Scene([ball]), ft.Rays(spoke * (1.0 - 1e-14), along), max_bounces=bounces)
+    paths = ft.trace(ft.Scene([ball]), ft.Rays(spoke * (1.0 - 1e-14), along), max_bounces=bounces, warn=False)
     worst = 0.0
     with mpmath.workdps(50):
         for row in range(0, count, 10):

@@ -30,7 +30,9 @@ def glass() -> None:
     ball = ft.Surface(shapes.icosphere(3 * mm, 4), ft.Dielectric(), "ball", back="BK7")
     floor = ft.Surface(shapes.plate(16 * mm, 16 * mm).moved([0, 0, -7 * mm]), ft.Absorber(), "floor")
     beam = ft.Beam([0, 0, 7 * mm], [0, 0, -1], [0, 1, 0], (5 * mm, 5 * mm), (60, 60))
-    paths = ft.trace(ft.Scene([ball, floor]), beam, wavelength=550 * nm, max_bounces=4, record=True)
+    paths = ft.trace(
+        ft.Scene([ball, floor]), beam, wavelength=550 * nm, max_bounces=4, record=True, warn=False
+    )
     views.picture(
         paths.scene, paths, IMAGES / "views_fate.png", colour="fate", most=60,
         clip=(np.array([0, -1, 0]), np.array([0, -1 * mm, 0])),

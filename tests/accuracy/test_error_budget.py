@@ -77,6 +77,7 @@ def test_it_reads_as_a_table():
         costs.hit = 0.0
 
 
+@pytest.mark.filterwarnings("ignore:(fringes alias|facets cost)")
 def test_a_form_takes_the_facets_off_the_bill():
     along = np.linspace(-4 * mm, 4 * mm, 17)
     mesh = shapes.height_map(-(along**2 + along[:, None] ** 2) / 2.0, 0.5 * mm)
@@ -128,6 +129,7 @@ def test_the_same_rays_again_are_the_same(bench):
 
 
 @pytest.mark.parametrize(("faintest", "waves"), [(0.1, 1), (1e-3, 2)])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_light_as_faint_is_followed_again(faintest, waves):
     """A sample that sends back a hundredth of an amplitude."""
     faint = ft.Surface(shapes.plate(8 * mm, 8 * mm), ft.Mirror(1e-4), "sample")

@@ -10,6 +10,9 @@ import fringetrace as ft
 from fringetrace import nm
 from fringetrace.geometry import forms, shapes
 
+# Rays are cut off on purpose: what becomes of them is looked at here, that it is warned of in `test_checks`.
+pytestmark = pytest.mark.filterwarnings("ignore:power is cut off")
+
 RADIUS = 65 * nm
 WAVE = 500 * nm
 # Off the axes, where numbers round as they do anywhere.

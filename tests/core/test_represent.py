@@ -1,6 +1,7 @@
 """Representations: short, useful, and never the numbers of an array."""
 
 import re
+import warnings
 from dataclasses import dataclass, fields, is_dataclass, replace
 from importlib import import_module
 from inspect import isclass
@@ -13,7 +14,7 @@ import pytest
 import fringetrace as ft
 from fringetrace import mm, nm
 from fringetrace.core import described, length_text, short_repr, value_text
-from fringetrace.field import reconstruct
+from fringetrace.field import Field, reconstruct, reconstruct_facet_waves
 from fringetrace.instruments import Arms, Mark
 from fringetrace.rigorous import mie
 
@@ -50,12 +51,15 @@ def things():
     paths, surface = BENCH.trace(), BENCH.scene.surfaces[1]
     yield from (BENCH, BENCH.scene, surface, surface.mesh, BENCH.beam, BENCH.ccd)
     yield from (paths, paths.ledger(), reconstruct(paths), ft.Rays(np.zeros((9, 3)), np.ones((9, 3))))
+    yield from (Field.of(paths, 500 * nm), reconstruct_facet_waves(paths))
     yield from (ft.materials.BK7, ft.films.quarter_wave_stack(2.3, 1.4, 9, 500 * nm))
     yield ft.films.fresnel(1.0, 1.5, np.linspace(0, 1, 50))
     yield mie.efficiencies(1e-7, 1.5, 1.0, 5e-7)
 
 
-THINGS = {type(thing).__name__: thing for thing in things()}
+with warnings.catch_warnings():  # the fringes of so few pixels alias
+    warnings.simplefilter("ignore", ft.FringetraceWarning)
+    THINGS = {type(thing).__name__: thing for thing in things()}
 
 
 def check(text):

@@ -14,6 +14,12 @@ from fringetrace.field.pixel_quadrature import mutual_products
 from fringetrace.geometry import shapes
 from fringetrace.tracing.paths import join
 
+# Rays are cut off on purpose, and waves cross at any angle: that there are warnings of it `test_checks` asks.
+pytestmark = [
+    pytest.mark.filterwarnings("ignore:power is cut off"),
+    pytest.mark.filterwarnings("ignore:fringes alias"),
+]
+
 # Sums of a few hundred terms of size 1.
 ROUNDING = 1e-12
 # What is asked of the phase of a path of 1 km.
@@ -164,6 +170,7 @@ def test_light_that_does_not_reach_the_ccd_leaves_no_trace():
 # The method by itself
 
 
+@pytest.mark.filterwarnings("ignore:media contradict")
 def test_the_method_is_chosen_by_what_it_can_do_and_what_it_costs():
     paths = ft.trace(EMPTY, scattered(2), ccd())
     assert choose(paths).method == "rays"

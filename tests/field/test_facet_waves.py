@@ -14,6 +14,8 @@ from fringetrace.geometry import shapes
 LAMBDA = 633 * nm
 WAVENUMBER = 2.0 * np.pi / LAMBDA
 PITCH = 50 * um
+# Means over pixels are exact for finer fringes, too; `test_checks` asks whether there are warnings.
+pytestmark = pytest.mark.filterwarnings("ignore:fringes alias")
 # Paths of some 30 mm, each of some ten steps rounded, as phases.
 PHASE = 2.0 * np.pi * 10 * 30 * mm * 2.0**-52 / LAMBDA
 

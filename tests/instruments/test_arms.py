@@ -39,6 +39,7 @@ def trips():
         (Mark(0, then=0), [0, 0, 0, 0]),
     ],
 )
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_mark_counts_what_light_met(trips, mark, counts):
     assert mark.count(trips).tolist() == counts
 

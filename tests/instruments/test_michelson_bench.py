@@ -233,6 +233,7 @@ def test_a_profile_is_given_over_the_image_of_every_bench(bench):
     np.testing.assert_allclose(instrument.interferogram(HENE), expected, atol=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_the_fizeau_shows_a_step_where_it_stands():
     """Brighter and darker halves, by the sample's x; the profile too."""
     step = ft.shapes.step(8 * mm, 8 * mm, 1 * mm, 100 * nm)

@@ -118,6 +118,7 @@ def test_dispersion_takes_the_fringes_of_white_light(compensator):
     assert visibility(bench, lamp) == pytest.approx(expected, abs=0.01)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_ghosts_have_path_keys_of_their_own_and_a_coating_takes_them_away():
     """The other face's reflection, off the sample and back: s light at 45 degrees on bare glass."""
     lam = 587.56 * nm

@@ -115,6 +115,7 @@ def test_the_powers_of_a_lossy_cavity_are_geometric_series(reflected, share, tur
 
 
 @pytest.mark.parametrize("reflectance", [0.9, 0.5, 0.04])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_mirror_s_losses_multiply(reflectance):
     plates = [shapes.plate(1.0, 1.0).moved((0, 0, z)) for z in (0.0, 0.1)]
     scene = ft.Scene([ft.Surface(plate, ft.Mirror(reflectance)) for plate in plates])

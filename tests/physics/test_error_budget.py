@@ -10,6 +10,7 @@ NAMES = [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for 
 
 
 @pytest.mark.parametrize("name", NAMES)
+@pytest.mark.filterwarnings("ignore:(fringes alias|facets cost)")
 def test_a_term_is_near_the_true_error(name):
     rows = list(cases.CASES[name][2]())
     assert len(rows) > 1

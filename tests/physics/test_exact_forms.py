@@ -72,6 +72,7 @@ def test_a_parabola_has_equal_paths_to_its_focus(kind):
     assert np.abs(plain - 2.5).max() > 1e-4
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_an_ellipsoid_sends_light_from_focus_to_focus_again_and_again():
     a, b = 1.0, 0.8
     c = math.sqrt(a * a - b * b)
@@ -102,6 +103,7 @@ PRINTED = 5e-10
 
 
 @pytest.mark.parametrize(("height", "crossing", "length"), SPHERE)
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_aberration_of_a_spherical_mirror(height, crossing, length):
     surface = ball(100.0, 3, inside=True)
     rays = ft.Rays([(height, 0.0, 0.0)], [(0.0, 0.0, 1.0)])
@@ -126,6 +128,7 @@ def test_a_corner_cube_returns_light_exactly():
     assert np.abs(back + 2 * np.einsum("ij,ij->i", start, direction))[thrice].max() < 1e-15 * 16
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_error_of_facets_falls_as_the_square_and_is_the_sag():
     rays = ft.Rays(np.zeros((20_000, 3)), directions(np.random.default_rng(7), 20_000))
     table = {3: 4.528e-3, 4: 1.138e-3, 5: 2.848e-4}  # largest sag of the unit icosphere
@@ -218,6 +221,7 @@ def test_two_discs_scatter_as_printed(sequence, length, spread):
 
 
 @pytest.mark.parametrize("level", [1, 3])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_rays_whisper_along_a_sphere(level):
     # chords from a hundredth of the facets' sag to a diameter; the cosine at the wall stays what it is
     rng = np.random.default_rng(11)
@@ -241,6 +245,7 @@ def test_rays_whisper_along_a_sphere(level):
 
 
 @pytest.mark.parametrize("radius", [0.5, 0.99, 0.9999])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_rays_between_shells_nearer_than_their_sag(radius):
     rng = np.random.default_rng(13)
     count, bounces = 1000, 100
@@ -277,6 +282,7 @@ def test_a_ball_casts_the_shadow_of_its_form():
     assert np.abs(paths.direction[met, 2] - out).max() < 2**-48
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_light_splits_at_both_sides_of_a_form():
     # a ball of splitter: reflected once, or through, and then out or on inside along equal chords
     mesh = shapes.icosphere(1.0, 2)
@@ -400,6 +406,7 @@ def test_no_ray_falls_through_waves(form):
     assert not (down & (np.abs(landing[:, :2]).max(axis=1) < 0.97)).any()
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_results_with_forms_do_not_depend_on_threads_or_chunks():
     rng = np.random.default_rng(31)
     rays = ft.Rays(rng.uniform(-0.3, 0.3, (1000, 3)), directions(rng, 1000))

@@ -138,6 +138,7 @@ def lattice(cells):
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_lattice_of_rods_is_the_same_from_any_number_of_rays():
     """Facets that no ray of the coarse grid meets are what is missing there; the rest is exact."""
     images = [ft.irradiance(lattice(cells), 500 * nm, "wavefront") for cells in (500, 2000)]

@@ -44,6 +44,7 @@ def test_a_gap_between_two_glass_plates(waves, power):
 
 
 @pytest.mark.parametrize("trips", [1, 2, 4, 8])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_each_round_trip_brings_the_sum_nearer_to_airys(trips):
     """What m round trips lack is the rest of a geometric series, t^2 r^(2m+1) / (1 - r^2 ...)."""
     gap = 1000.2 * HENE
@@ -111,6 +112,7 @@ def test_the_height_of_a_step_is_found_where_one_face_reflects_little(between):
     assert rise == pytest.approx(60 * nm, abs=0.04 * HENE / (4 * np.pi * between))
 
 
+@pytest.mark.filterwarnings("ignore:fringes alias")
 def test_newtons_rings():
     """Dark at r_m = sqrt(m lambda R - (m lambda / 2)^2), R = 1 m: where the gap has grown by m half waves.
 
@@ -129,6 +131,7 @@ def test_newtons_rings():
         assert crossing / mm == pytest.approx(dark, rel=1e-5)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_whole_plate_has_a_ghost_that_a_coating_takes_away():
     """The upper face reflects 4 %; a quarter-wave layer of sqrt(n) sends nothing back."""
     film = Film(((math.sqrt(GLASS), HENE / (4 * math.sqrt(GLASS))),))
@@ -149,6 +152,7 @@ def test_a_whole_plate_has_a_ghost_that_a_coating_takes_away():
     assert ghosts[1] < 1e-12
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_wedged_plate_leads_its_ghost_aside():
     """The upper face tilted by w sends its light off by 2w."""
     bench = instruments.fizeau(
@@ -159,6 +163,7 @@ def test_a_wedged_plate_leads_its_ghost_aside():
     np.testing.assert_allclose(np.arcsin(up.direction[:, 0]), 0.04, rtol=0, atol=1e-12)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_the_camera_sees_the_sample_through_the_plate():
     """A tilted sample: its light comes from where it stands, up to the third order of its angle."""
     slope = 0.01

@@ -72,6 +72,7 @@ def test_dark_rings_lie_where_newton_saw_them(order, radius):
     ("index", "angle", "wavelength", "spacing"),
     [(1.0, 50e-6, 632.8 * nm, 6328.000), (1.515, math.radians(10 / 3600), 632.8 * nm, 4307.735)],
 )
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_spacing_of_fizeau_fringes(index, angle, wavelength, spacing):
     """wavelength / (2 n tan a), in micrometres, of a wedge of air in glass and of glass in air."""
     around = GLASS if index == 1.0 else 1.0

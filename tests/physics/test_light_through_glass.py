@@ -129,6 +129,7 @@ def test_fringes_of_equal_inclination(tilt, n):
 
 
 @pytest.mark.parametrize("around", [1.0, 1.33])
+@pytest.mark.filterwarnings("ignore:fringes alias")
 def test_fringes_of_equal_thickness(around):
     """A wedge of 0.5 mrad, between the two plane waves and more that go through it."""
     scene = wedge(1.5, 1 * mm, 0.01, 5e-4, around)
@@ -174,6 +175,7 @@ def test_both_methods_agree_on_an_absorbing_slab():
 
 
 @pytest.mark.parametrize("state", [None, (1.0, 0.5j)])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_another_wavelength_needs_no_new_trace_where_nothing_is_bent(state):
     """Dispersive, absorbing, coated, turned: straight through, each path as a new trace has it."""
     turn = rotation((1.0, 2.0, 3.0), 0.7)
@@ -224,6 +226,7 @@ def test_another_wavelength_needs_no_new_trace_where_nothing_is_bent(state):
     assert np.abs(both[0] - ft.complex_field(one, 500 * nm, "rays")).max() > 0.1
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_prism_of_one_index_serves_all_wavelengths():
     scene = wedge(1.5, 1 * mm, 0.4, 0.1)
     one = ft.trace(scene, lit(), screen(), wavelength=500 * nm)

@@ -99,6 +99,7 @@ def rod(radius):
 
 
 @pytest.mark.parametrize("sample", ["rod", "ball"])
+@pytest.mark.filterwarnings("ignore:media contradict")
 def test_a_refocused_cylinder_and_a_ball(sample):
     """R = 10 um, to the printed digits; across the middle a ball bends light as a cylinder does."""
     radius = 10 * um

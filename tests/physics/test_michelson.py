@@ -164,6 +164,7 @@ def dirichlet(turns, count):
 
 
 @pytest.mark.parametrize("count", [1, 4, 9])
+@pytest.mark.filterwarnings("ignore:fringes alias")
 def test_many_rays_in_a_pixel_sum_to_the_mean_of_the_wave(count):
     """The ray sum is |mean E|^2: the tilted wave fades as the (discrete) sinc, the other does not."""
     tilt, pitch = 20e-3, 8 * um
@@ -181,6 +182,7 @@ def test_many_rays_in_a_pixel_sum_to_the_mean_of_the_wave(count):
 
 
 @pytest.mark.parametrize(("pitch", "visibility"), [(8 * um, 0.62952984), (3.45 * um, 0.92362532)])
+@pytest.mark.filterwarnings("ignore:fringes alias")
 def test_a_pixel_that_averages_irradiance_sees_the_sinc(pitch, visibility):
     """mean |E|^2 over a box."""
     tilt = 20e-3

@@ -50,6 +50,7 @@ def test_a_corner_cube(turn, subdivisions):
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.1, 2.0])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_thousand_bounces_between_parallel_plates(slope):
     gap, count = 0.25, 1000
     low, high = shapes.plate(1200.0, 2.0), shapes.plate(1200.0, 2.0).moved((0, 0, gap))
@@ -133,6 +134,7 @@ def test_a_wedge_of_two_mirrors(angle, parts):
 # Mirrors parallel to an axis leave the part of a direction along it as it is.
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_box_keeps_the_parts_of_a_direction():
     rng = np.random.default_rng(3)
     rays = ft.Rays(rng.uniform(-0.4, 0.4, (50, 3)), rng.normal(size=(50, 3)))
@@ -147,6 +149,7 @@ def test_a_box_keeps_the_parts_of_a_direction():
 
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_light_goes_the_same_way_back(seed):
     rng = np.random.default_rng(seed)
     x = np.linspace(-1.0, 1.0, 21)
@@ -157,8 +160,19 @@ def test_light_goes_the_same_way_back(seed):
     middle = 0.5 * (there.points[:, 11] + there.points[:, 12])
     back = ft.trace(room, ft.Rays(middle, unit(there.points[:, 11] - middle)), max_bounces=11, record=True)
     assert np.array_equal(back.triangle, there.triangle[:, 10::-1])
-    np.testing.assert_allclose(back.points[:, 1:12], there.points[:, 11:0:-1], rtol=0, atol=1e-11)
-    np.testing.assert_allclose(back.direction, -direction, rtol=0, atol=1e-11)
+    # each bounce turns a ray by a rounding, and so do the points that the start is taken from, the more the
+    # nearer they are; over the whole way this moves hits, at grazing incidence most
+    corners = room.surfaces[0].mesh.vertices[room.surfaces[0].mesh.faces[there.triangle]]
+    normal = unit(np.cross(corners[..., 1, :] - corners[..., 0, :], corners[..., 2, :] - corners[..., 0, :]))
+    steps = np.diff(there.points[:, :13], axis=1)
+    cosine = np.abs((steps * normal).sum(axis=2)) / np.linalg.norm(steps, axis=2)
+    turned = 12 * EPS + EPS * np.nanmax(np.abs(there.points)) / np.linalg.norm(
+        middle - there.points[:, 11], axis=1
+    )
+    moved = 2 * turned * np.linalg.norm(steps, axis=2).sum(axis=1) / cosine.min(axis=1)
+    apart = np.abs(back.points[:, 1:12] - there.points[:, 11:0:-1]).max(axis=(1, 2))
+    assert (apart <= moved).all()
+    assert (np.abs(back.direction + direction).max(axis=1) <= 2 * turned).all()
     last = np.linalg.norm(start - there.points[:, 1], axis=1)
     half = np.linalg.norm(there.points[:, 12] - middle, axis=1)
     np.testing.assert_allclose(back.length + last + half, there.length, rtol=1e-11)
@@ -168,6 +182,7 @@ def test_light_goes_the_same_way_back(seed):
 
 
 @pytest.mark.parametrize("sides", [18, 60, 400])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_polygon_for_a_circle_seen_from_its_centre(sides):
     # there and back: 2 (cos(pi/n) / cos(angle from the middle of a side) - 1); from 0 to -h^2/4, mean -h^2/6
     polygon = shapes.rod_lattice(1, 1, 1.0, 3.0, 2.0, sides=sides)

@@ -57,6 +57,7 @@ def rings(rho, gap=0.0):
 
 
 @pytest.mark.parametrize("gap", [0.0, 1 * nm, 150 * nm])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_the_image_is_that_of_both_rays(gap):
     ccd = camera(5 * mm, 96)
     nodes, weights = np.polynomial.legendre.leggauss(8)
@@ -69,6 +70,7 @@ def test_the_image_is_that_of_both_rays(gap):
 
 
 @pytest.mark.parametrize(("order", "radius"), [(1, 0.767658722 * mm), (10, 2.427548417 * mm)])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_dark_rings_lie_where_newton_saw_them(order, radius):
     """r_m^2 = m lambda R - (m lambda / 2)^2."""
     assert radius == pytest.approx(math.sqrt(order * SODIUM * R - (order * SODIUM / 2) ** 2), rel=1e-9)

@@ -20,7 +20,7 @@ def test_no_path_differs_from_what_the_oracle_allows(kind, seed):
 def test_the_oracle_sees_a_face_that_is_passed_over():
     some = random_scenes.case(0, 100, "windows")
     whole = random_scenes.tried(0, 100, "windows")[1]
-    without = ft.trace(ft.Scene(some.scene.surfaces[1:]), some.rays, max_bounces=60, record=True)
+    without = ft.trace(ft.Scene(some.scene.surfaces[1:]), some.rays, max_bounces=60, record=True, warn=False)
     shifted = np.where(without.surface >= 0, without.surface + 1, -1)
     assert whole.bounces.sum() > without.bounces.sum()
     faults = random_scenes.judge(some, replace(without, surface=shifted))

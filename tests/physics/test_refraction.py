@@ -76,6 +76,7 @@ def test_total_reflection_and_its_phase():
 
 
 @pytest.mark.parametrize("angle", [48.624359160, 54.623105441])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_fresnel_rhomb(angle):
     """Two total reflections turn light at 45 degrees into circular light."""
     depth = 0.1
@@ -292,6 +293,7 @@ def corner_prism(side=1.0):
 
 
 @pytest.mark.parametrize("sextant", range(6))
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_total_reflections_in_a_corner_cube(sextant):
     """Each sextant is a Jones matrix of its own: three reflections in another order (Peck, 1962)."""
     n = 1.5

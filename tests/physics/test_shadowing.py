@@ -51,6 +51,7 @@ def test_single_rays_lie_within_their_bounds(slope):
 
 
 @pytest.mark.parametrize("bounces", [1, 2, 4, 6])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_place_direction_and_path_lie_within_their_bounds(bounces):
     rng = np.random.default_rng(3)
     rays = 40

@@ -38,6 +38,7 @@ def off_torus(point, large, small):
     return np.hypot(np.hypot(point[:, 0], point[:, 1]) - large, point[:, 2]) - small
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_patches_come_nearer_to_a_sphere_as_the_fourth_power():
     rng = np.random.default_rng(1)
     rays = ft.Rays(rng.uniform(-0.4, 0.4, (4000, 3)), directions(rng, 4000))
@@ -63,6 +64,7 @@ def test_patches_come_nearer_to_a_sphere_as_the_fourth_power():
 @pytest.mark.parametrize(
     ("kind", "given"), [("even", True), ("skew", True), pytest.param("skew", False, marks=pytest.mark.slow)]
 )
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_patches_come_nearer_to_a_torus_as_the_third_power_or_better(kind, given):
     rng = np.random.default_rng(2)
     count = 1500
@@ -82,6 +84,7 @@ def test_patches_come_nearer_to_a_torus_as_the_third_power_or_better(kind, given
     assert worst[1] / worst[2] > 7.0
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_patches_are_continuous_across_the_sides_of_faces():
     # rays a hair to the left and to the right of each side of the faces
     mesh, normal = torus(1.0, 0.4, 24, 16, "skew")
@@ -110,6 +113,7 @@ def test_patches_are_continuous_across_the_sides_of_faces():
 
 
 @pytest.mark.parametrize("grazing", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_room_of_patches_keeps_every_ray(grazing):
     rng = np.random.default_rng(3)
     count, bounces = (200, 10) if grazing else (400, 40)

@@ -121,6 +121,7 @@ def test_two_layers_by_bounces(state):
         )
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_quarter_wave_mirror_by_bounces():
     """Three layers: at the wavelength they are made for all ways add in phase, the faint ones too."""
     indices = [1.0, 2.3, 1.38, 2.3, 1.52]

@@ -212,6 +212,7 @@ def test_pixels_on_a_slanted_step_see_both_its_sides(rise):
     assert image == pytest.approx(lower + (1 - lower) * upper, abs=1e-8)
 
 
+@pytest.mark.filterwarnings("ignore:fringes alias")
 def test_tilt_fringes_on_a_step_are_averaged_up_to_its_edge():
     """The mean of cos^2 over the part of a pixel on either side, in closed form."""
     tilt, rise, edge, width, count = 4e-3, 50 * nm, 0.517 * mm, 3 * mm, 60
@@ -266,6 +267,7 @@ def lit_width(region):
     return (width * (to_t - t)).sum()
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_the_regions_of_a_lattice_are_as_wide_as_rays_count():
     """Rods are prisms: of 200,000 rays across the beam, as many take a sequence as its region is wide."""
     scene = ft.Scene([ft.Surface(shapes.rod_lattice(6, 3, 65 * nm, 280 * nm, 2 * um), ft.Mirror())])

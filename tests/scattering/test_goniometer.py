@@ -203,6 +203,7 @@ def test_a_jones_vector_an_incidence():
     assert straight.values == pytest.approx(scalar.values, rel=1e-11)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_plane_of_rods_keeps_s_and_p():
     """Along rods s is along every boundary: what light of one number a ray is."""
     glass = RodLattice(3, 2, rod=1.6, host=1.4)

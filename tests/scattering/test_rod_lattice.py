@@ -85,6 +85,7 @@ def test_large_rods_absorb_as_the_rigorous_answer_says():
     assert lacking[1] < 0.5 * 160 ** (-2 / 3)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_a_feather_keeps_its_power():
     kind = RodLattice(
         3, 3, pitch=150 * nm, arrangement="square", rod="melanin", host="keratin", cortex=100 * nm,

@@ -150,6 +150,17 @@ def test_light_keeps_its_etendue_through_a_face():
         assert table[0, 1] == pytest.approx(table[1, 0], rel=1e-9)
 
 
+def test_a_study_tells_once_of_power_that_is_cut_off(serial):
+    text = r"power is cut off: up to 0\.\d+ of .* in 2 of 2 .*, most at \{'rows': 2\}; allow .* than 3, or"
+    with pytest.warns(ft.FringetraceWarning, match=text) as told:
+        study(
+            RodLattice(3, 1, rod=1.6), {"rows": (1, 2)}, [0.0, 0.3], [0.2], WAVES[:1], rays=60, max_bounces=3,
+            executor=serial,
+        )  # fmt: skip
+    assert len(told) == 1
+
+
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_rigorous_and_ray_studies_take_either_polarisation(serial):
     """s, p, and their mean; each as `cluster` and the goniometer have it."""
     kind, given = RodLattice(3, 2, rod=1.6, host=1.4), ([0.3], [-0.3, 0.2], WAVES[:2])

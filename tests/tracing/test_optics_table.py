@@ -204,7 +204,8 @@ def test_contradicting_media_want_a_new_trace():
     ball = ft.Surface(
         shapes.icosphere(0.5, 1), ft.Dielectric(), "ball", forms.Sphere((0, 0, 0), 0.5), back="BK7"
     )
-    paths = ft.trace(ft.Scene([ball]), ft.Rays([(0, 0, 0)], [(0, 0, 1)]), wavelength=500 * nm)
+    with pytest.warns(ft.FringetraceWarning, match="media contradict: 1 rays came to 'ball'"):
+        paths = ft.trace(ft.Scene([ball]), ft.Rays([(0, 0, 0)], [(0, 0, 1)]), wavelength=500 * nm)
     with pytest.raises(ValueError, match="rays came to surfaces in media that these do not have there"):
         at_wavelength(paths, 600 * nm)
 

@@ -11,6 +11,9 @@ from fringetrace.scene.sensor import pixels
 from fringetrace.tracing.detection import project
 from fringetrace.tracing.paths import join
 
+# Rays are cut off on purpose: what becomes of them is looked at here, that it is warned of in `test_checks`.
+pytestmark = pytest.mark.filterwarnings("ignore:power is cut off")
+
 LEDGER = 1e-12
 ROUNDING = 1e-14
 
@@ -132,6 +135,7 @@ def test_the_ledger_says_where_the_power_went():
     assert ledger.error < LEDGER
 
 
+@pytest.mark.filterwarnings("ignore:paths multiply")
 def test_the_ledger_of_many_paths_from_one_ray_loses_no_digits():
     plates = scene(*[ft.BeamSplitter(0.3**0.5 * 1j, 0.7**0.5)] * 8)
     ray = ft.Rays([[1e-4, 2e-4, -5e-3]], [[0.01, 0.02, 1.0]])
@@ -183,6 +187,7 @@ def test_one_part_is_the_whole():
 
 @pytest.mark.parametrize("focus", [0.0, 1.5, -0.7])
 @pytest.mark.parametrize("normal", [(0, 0, -1), (0.2, -0.3, -1)])
+@pytest.mark.filterwarnings("ignore:fringes alias")
 def test_projecting_is_tracing_where_nothing_stands_between(normal, focus):
     ccd = ft.CCD((0.1, 0.2, 6.0), normal, (0, 1, 0), 0.25, (9, 12), focus=focus)
     rays = scattered()

@@ -97,6 +97,7 @@ def test_glass_is_longer_and_what_rays_bring_along_counts_from_the_start(window)
     np.testing.assert_allclose(found[:6] / mm, [7, 8, 11, 14, 17, 20], rtol=ROUNDED)
 
 
+@pytest.mark.filterwarnings("ignore:power is cut off")
 def test_optical_paths_of_all_branches_are_sums_over_their_segments():
     """Balls of glass, of all sizes of contact and order of branches: no segment's index is guessed."""
     rng = np.random.default_rng(5)

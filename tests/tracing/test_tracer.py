@@ -14,6 +14,9 @@ from fringetrace.core.vectors import rotation
 from fringetrace.geometry import shapes
 from fringetrace.tracing.detection import project
 
+# Rays are cut off on purpose: what becomes of them is looked at here, that it is warned of in `test_checks`.
+pytestmark = pytest.mark.filterwarnings("ignore:power is cut off")
+
 # A dozen roundings: a path is a sum of a few segments.
 ROUNDING = 1e-14
 LEDGER = 1e-12
@@ -595,3 +598,21 @@ def test_bounces_may_be_counted_by_any_integer(most, record):
     # light is too faint after some eighty bounces
     plain = ft.trace(scene, ray, max_bounces=12 if most == 12 else 100, record=record)
     assert np.array_equal(ft.trace(scene, ray, max_bounces=most, record=record).key, plain.key)
+
+
+def test_no_kernel_takes_named_tuples():
+    """Numba would pickle their classes into its cache, which none could load once they have moved."""
+    from numba.core.types import NamedTuple, NamedUniTuple
+
+    from fringetrace.tracing import kernels_boundary, kernels_loop, kernels_rays
+
+    glass = ft.Scene([ft.Surface(shapes.plate(1.0, 1.0, 1.0), ft.Dielectric(), back=1.5)])
+    for scene in (SCENE, glass):
+        ft.trace(scene, one())
+    seen = 0
+    for module in (kernels_boundary, kernels_loop, kernels_rays):
+        for function in vars(module).values():
+            for signature in getattr(function, "signatures", ()):
+                seen += 1
+                assert not any(isinstance(kind, (NamedTuple, NamedUniTuple)) for kind in signature)
+    assert seen > 3

@@ -177,6 +177,7 @@ SKIPS = [
 
 
 @pytest.mark.parametrize("name", SKIPS)
+@pytest.mark.filterwarnings("ignore:(power is cut off|fringes alias)")
 def test_a_skip_changes_no_result(name):
     case = skips.SKIPS[name](24)
     on, off = case.on(), case.off()

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, FringetraceWarning, checked_wavelength
+from fringetrace.core import Array, FloatArray, warn_once
 from fringetrace.scene import CCD, Beam, pixel_indices
-from fringetrace.tracing import Paths
+from fringetrace.tracing import Losses, Paths
 
-if TYPE_CHECKING:
-    from fringetrace.accuracy.error_budget import Budget
-
-# Facets may cost this many waves, at the rms.
-COSTLY = 1.0 / 20.0
-# So many pixels, as a part of those lit, may be without rays, or have fringes too fine for them.
+# So many pixels, as a part of those lit, may be without rays.
 FEW = 0.01
-# Rays in a part of the image, at the least, that tell the slopes of its waves.
-ENOUGH = 4
 # Path keys that are looked at one by one: those with the most rays.
 KEYS = 8
 # A wave is at its focus where a ray tube's area, between its neighbours, touches this part of theirs, or
@@ -29,15 +20,15 @@ KEYS = 8
 TOUCH, NARROW = 0.1, 0.1
 
 
-def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
-    """Find all problems: contradicting media, aliased fringes; starved pixels and folds of ray sums.
+def found(paths: Paths, wavelength: float, method: str = "auto") -> dict[str, str]:
+    """Find all problems of a trace and of its image: the text of each warning by its name.
 
-    Of the wavefront method, foci and cusps on the CCD.
+    Of any trace those of `fringetrace.tracing.checks`: power cut off, contradicting media, open boundaries.
+    Of light on a CCD aliased fringes, and starved pixels and folds of ray sums, or foci and cusps.
 
     Parameters
     ----------
     paths : Paths
-        Onto a CCD.
     wavelength : float, metres
     method : {"auto", "wavefront", "rays"}
         How the field is found, see `complex_field`. The wavefront method needs no ray in each pixel, and
@@ -45,24 +36,24 @@ def found(paths: Paths, wavelength: float, method: str = "auto") -> list[str]:
 
     Returns
     -------
-    list of str
+    dict of str to str
     """
-    from fringetrace.field import chosen
+    from fringetrace.field import aliasing, chosen
 
-    seen = paths.detected
-    if len(seen) == 0:
-        text = media_contradiction(paths)
-        return [] if text is None else [text]
-    texts = [media_contradiction(paths), aliasing(seen, wavelength)]
-    if chosen(paths, method) == "rays":
-        texts += [starvation(seen), folding(seen)]
-    else:
-        texts.append(focusing(seen, wavelength))
-    return [text for text in texts if text is not None]
+    problems, seen = Losses.of(paths).problems, paths.detected
+    if paths.ccd is None or len(seen) == 0:
+        return problems
+    texts = {"fringes alias": aliasing(paths, wavelength)}
+    method = chosen(paths, method)
+    if method == "rays":
+        texts |= {"pixels starve": starvation(seen), "a wave folds": folding(seen)}
+    elif method == "wavefront":
+        texts["a wave comes to a focus"] = focusing(seen, wavelength)
+    return problems | {name: text for name, text in texts.items() if text is not None}
 
 
 def check(paths: Paths, wavelength: float, method: str = "auto") -> None:
-    """Warn of the problems that `found` finds.
+    """Warn of the problems that `found` finds, of each once.
 
     Parameters
     ----------
@@ -73,111 +64,10 @@ def check(paths: Paths, wavelength: float, method: str = "auto") -> None:
     -----
     FringetraceWarning
     """
-    for text in found(paths, wavelength, method):
-        warnings.warn(text, FringetraceWarning, stacklevel=3)
-
-
-def check_budget(budget: Budget) -> None:
-    """Warn of costly facets.
-
-    Parameters
-    ----------
-    budget : Budget
-    """
-    text = costly(budget)
-    if text is not None:
-        warnings.warn(text, FringetraceWarning, stacklevel=3)
-
-
-def judge(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, list[str]]:
-    """Error budget of an image, and all warnings.
-
-    Parameters
-    ----------
-    paths, wavelength, method
-        As in `found`.
-
-    Returns
-    -------
-    Budget
-    list of str
-    """
-    from fringetrace.accuracy.error_budget import budget
-
-    costs = budget(paths, wavelength, method)
-    return costs, [*found(paths, wavelength, method), *filter(None, [costly(costs)])]
-
-
-def media_contradiction(paths: Paths) -> str | None:
-    """Contradicting media: rays reach a boundary in another medium than it has on that side.
-
-    Parameters
-    ----------
-    paths : Paths
-
-    Returns
-    -------
-    str or None
-    """
-    if paths.contradictions is None or not paths.contradictions.any():
-        return None
-    worst = int(np.argmax(paths.contradictions))
-    surface, number = paths.scene.surfaces[worst], int(paths.contradictions[worst])
-    sides = " and ".join((side or paths.scene.around).name for side in (surface.front, surface.back))
-    return (
-        f"media contradict: {number:,} rays came to {surface.name!r}, between {sides} (front and back), in "
-        f"another medium; close its mesh, turn its normals to the front, name the media of what lies "
-        f"before it, or take the bodies apart where they overlap"
-    )
-
-
-def aliasing(paths: Paths, wavelength: float) -> str | None:
-    """Aliased fringes: the phase between two waves changes by more than pi per pixel.
-
-    Slopes are means over the rays of one path key, in parts of the image that are as small as the
-    rays allow.
-
-    Parameters
-    ----------
-    paths : Paths
-        Detected.
-    wavelength : float, metres
-
-    Returns
-    -------
-    str or None
-    """
-    ccd = _ccd(paths)
-    size = max(1, int(np.ceil(np.sqrt(ENOUGH * ccd.shape[0] * ccd.shape[1] / _rays(paths)))))
-    rows, columns = (-(-n // size) for n in ccd.shape)
-    at = pixel_indices(ccd, paths.pixel) // size
-    part = at[:, 0] * columns + at[:, 1]
-    kinds, which = np.unique(paths.key, return_inverse=True)
-    if len(kinds) < 2:
-        return None
-    group, member, count = np.unique(
-        part * len(kinds) + which.ravel(), return_inverse=True, return_counts=True
-    )
-    u, v, _ = ccd.axes
-    step = np.zeros(rows * columns)
-    for axis in (u, v):
-        mean = np.bincount(member.ravel(), paths.gradient @ axis) / count
-        low, high = np.full(len(step), np.inf), np.full(len(step), -np.inf)
-        np.minimum.at(low, group // len(kinds), mean)
-        np.maximum.at(high, group // len(kinds), mean)
-        step = np.maximum(step, np.where(high > low, high - low, 0.0) * ccd.pitch)
-    cycles = step / checked_wavelength(wavelength)
-    bad = cycles > 0.5
-    if bad.sum() <= FEW * len(np.unique(part)):
-        return None
-    worst = int(np.argmax(cycles))
-    row, column = (n * size + size // 2 for n in divmod(worst, columns))
-    number = min(int(bad.sum()) * size**2, ccd.shape[0] * ccd.shape[1])
-    return (
-        f"fringes alias: the phase steps by more than pi a pixel at {number:,} of "
-        f"{ccd.shape[0] * ccd.shape[1]:,} pixels, by {2.0 * cycles[worst]:.3g} pi about [{row}, {column}]; "
-        f"take {np.ceil(2.0 * cycles[worst]):.0f} times as many pixels along either axis, or less tilt"
-    )
+    known = paths.derived.setdefault("checked", set())
+    if (wavelength, method) not in known:
+        known.add((wavelength, method))
+        warn_once(found(paths, wavelength, method), paths.warned)
 
 
 def starvation(paths: Paths) -> str | None:
@@ -287,37 +177,10 @@ def focusing(paths: Paths, wavelength: float) -> str | None:
     )
 
 
-def costly(budget: Budget) -> str | None:
-    """Costly facets: their path error exceeds a twentieth of a wave.
-
-    Parameters
-    ----------
-    budget : Budget
-
-    Returns
-    -------
-    str or None
-    """
-    if budget.facets <= COSTLY or budget.costliest is None:
-        return None
-    name, worst = budget.costliest
-    finer = np.sqrt(budget.facets / COSTLY)
-    return (
-        f"facets cost {budget.facets:.2g} waves rms, over 1/20: those of {name!r} up to {worst:.2g}; if they "
-        "stand for a smooth surface, give it a form, such as forms.Smooth(), or facets "
-        f"{finer:.1f} times as small"
-    )
-
-
 def _ccd(paths: Paths) -> CCD:
     if paths.ccd is None:
-        raise ValueError("guards: expected paths traced onto a CCD, got paths without one")
+        raise ValueError("checks: expected paths traced onto a CCD, got paths without one")
     return paths.ccd
-
-
-def _rays(paths: Paths) -> int:
-    """Rays of the commonest path key."""
-    return int(np.unique(paths.key, return_counts=True)[1].max())
 
 
 def _commonest(paths: Paths) -> Iterator[Array]:

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fringetrace.core import Array, FloatArray, checked_wavelength, short_repr
+from fringetrace.accuracy.checks import found
+from fringetrace.core import Array, FloatArray, checked_wavelength, short_repr, warn_once
 from fringetrace.scene import Beam
 from fringetrace.tracing import Paths, at_wavelength, retrace
 
@@ -20,6 +21,8 @@ ENOUGH, NARROWEST = 9, 1e-3
 FINEST = 128
 # Fewer rays are doubled first: a quarter of them would have too few neighbours for the method's order.
 FEWEST = 20
+# Facets may cost this many waves, at the rms.
+COSTLY = 1.0 / 20.0
 # What the terms say of themselves.
 CAUSES = {
     "hit": "rounding of hits and paths in float64",
@@ -102,7 +105,43 @@ def budget(paths: Paths, wavelength: float, method: str = "auto") -> Budget:
     ------
     ValueError
         For paths without a CCD or not of a beam, a wavelength that is none, an unknown method.
+
+    Warns
+    -----
+    FringetraceWarning
+        Of all that `accuracy.check` warns of, and of costly facets; of each once.
     """
+    costs, problems = judge(paths, wavelength, method)
+    warn_once(problems, paths.warned)
+    return costs
+
+
+def judge(paths: Paths, wavelength: float, method: str = "auto") -> tuple[Budget, dict[str, str]]:
+    """Error budget of an image, and all that there is to warn of, without a warning.
+
+    Parameters
+    ----------
+    paths, wavelength, method
+        As in `budget`.
+
+    Returns
+    -------
+    Budget
+    dict of str to str
+        The text of each warning by its name.
+
+    Raises
+    ------
+    ValueError
+        As `budget`.
+    """
+    costs = _budget(paths, wavelength, method)
+    facets = costly(costs)
+    problems = found(paths, wavelength, method)
+    return costs, problems if facets is None else problems | {"facets cost": facets}
+
+
+def _budget(paths: Paths, wavelength: float, method: str) -> Budget:
     from fringetrace.accuracy import sampling
     from fringetrace.field import chosen
 
@@ -125,6 +164,28 @@ def budget(paths: Paths, wavelength: float, method: str = "auto") -> Budget:
         rays = sampling.sampling_error(grids, wavelength, steps)
         pixel = sampling.quadrature_error(grids[0], wavelength)
     return Budget(hit_error(probes, wavelength), facets, rays, pixel, wavelength, method, costliest)
+
+
+def costly(budget: Budget) -> str | None:
+    """Costly facets: their path error exceeds a twentieth of a wave.
+
+    Parameters
+    ----------
+    budget : Budget
+
+    Returns
+    -------
+    str or None
+    """
+    if budget.facets <= COSTLY or budget.costliest is None:
+        return None
+    name, worst = budget.costliest
+    finer = np.sqrt(budget.facets / COSTLY)
+    return (
+        f"facets cost {budget.facets:.2g} waves rms, over 1/20: those of {name!r} up to {worst:.2g}; if they "
+        "stand for a smooth surface, give it a form, such as forms.Smooth(), or facets "
+        f"{finer:.1f} times as small"
+    )
 
 
 def again(paths: Paths, shape: tuple[int, int], record: bool = False) -> Paths:

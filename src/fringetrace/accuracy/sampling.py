@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray
-from fringetrace.field import centred, complex_field, reconstruct, reconstruct_facet_waves
+from fringetrace.field import centred, light_on, reconstruct, reconstruct_facet_waves
 from fringetrace.scene import CCD, Beam, crop, pixels
 from fringetrace.tracing import Paths
 
@@ -166,8 +166,8 @@ def offset_error(paths: Paths, wavelength: float) -> float:
     assert paths.ccd is not None
     seen = paths.detected
     parts = [_onto(seen, ccd) for ccd in _parts(paths.ccd)]
-    means = [complex_field(spread_over_pixels(part, wavelength), wavelength, "rays") for part in parts]
-    return _difference(means, [complex_field(part, wavelength, "rays") for part in parts])
+    means = [_ray_sum(spread_over_pixels(part, wavelength), wavelength) for part in parts]
+    return _difference(means, [_ray_sum(part, wavelength) for part in parts])
 
 
 def count_error(paths: Paths, wavelength: float) -> float:
@@ -198,10 +198,15 @@ def count_error(paths: Paths, wavelength: float) -> float:
         few = all_.where(_even(row) & _even(column))
         assert few.area is not None
         few = replace(few, area=4.0 * few.area)
-        fields.append(complex_field(spread_over_pixels(all_, wavelength), wavelength, "rays"))
-        others.append(complex_field(spread_over_pixels(few, wavelength), wavelength, "rays"))
+        fields.append(_ray_sum(spread_over_pixels(all_, wavelength), wavelength))
+        others.append(_ray_sum(spread_over_pixels(few, wavelength), wavelength))
     return _difference(fields, others)
 
 
 def _even(number: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(number % 2 == 0)
+
+
+def _ray_sum(paths: Paths, wavelength: float) -> ComplexArray:
+    """Field by ray sum, of rays that are not the image's: whether their fringes alias is not asked."""
+    return light_on(paths, wavelength, "rays").complex_field(wavelength)

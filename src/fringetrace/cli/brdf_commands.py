@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from fringetrace.core import FloatArray, degree, parse_angle, parse_length, staged
+from fringetrace.core import FloatArray, FringetraceWarning, degree, parse_angle, parse_length, staged
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -109,9 +110,11 @@ def brdf(
             "method": method, "rays": rays, "polarisation": polarisation, "threads": threads,
             "min_amplitude": SPLIT if scene.surfaces[0].boundary else FAINT,
         }  # fmt: skip
-        table = scattering.brdf(
-            scene, theta, detector, _steps(wavelengths, "--wavelengths", parse_length), **options
-        )
+        with warnings.catch_warnings(record=True) as given:  # they are said as notes
+            warnings.simplefilter("always", FringetraceWarning)
+            table = scattering.brdf(
+                scene, theta, detector, _steps(wavelengths, "--wavelengths", parse_length), **options
+            )
         if radius is not None:
             table.attrs |= validity(radius, float(table.wavelength.max()), CONDUCTOR).attributes
         files = _write(table, part, over)
@@ -120,6 +123,7 @@ def brdf(
         ("sample", f"{mesh.name}: {len(sample.faces):,} triangles"),
         *_powers(table),
         _budget(table, scene, detector, options),
+        *(("note", str(one.message)) for one in given),
         ("rays", f"{table.attrs['validity']}{guess}"),
         ("written", f"{folder}: {', '.join(files)}"),
     ]

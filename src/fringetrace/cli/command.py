@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from fringetrace.cli import brdf_commands, scene_commands
 from fringetrace.core import (
     Array,
     FloatArray,
+    FringetraceWarning,
     checked_wavelength,
     length_text,
     parse_angle,
@@ -191,7 +193,7 @@ def bench(
 
 def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Settings) -> None:
     """Trace, measure, write; say what was done."""
-    from fringetrace.accuracy import checks
+    from fringetrace.accuracy import judge
     from fringetrace.field import choose
     from fringetrace.validation import measurement
     from fringetrace.views import viewer
@@ -199,7 +201,8 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
     console = _console()
     wavelength = checked_wavelength(parse_length(settings.wavelength, "--wavelength"))
     bench, centre = _bench(mesh, aperture, wavelength, settings)
-    with staged(out) as folder, ThreadPoolExecutor(2) as aside:
+    with staged(out) as folder, ThreadPoolExecutor(2) as aside, warnings.catch_warnings():
+        warnings.simplefilter("ignore", FringetraceWarning)  # they are said as notes
         _say_bench(console, name, mesh, bench, wavelength)
         scene = None
         if settings.picture:
@@ -215,7 +218,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
         # what is averaged over pixels is compared with a mean
         parts = 1 if choice.method == "rays" else 2
         truth = aside.submit(measurement.heights, mesh, bench.ccd.shape, bench.ccd.pitch, centre, parts)
-        costing = aside.submit(checks.judge, bench.trace(), wavelength, choice.method)
+        costing = aside.submit(judge, bench.trace(), wavelength, choice.method)
         measured = measurement.measure_height(bench, truth.result(), wavelength, settings.steps)
         _say_result(console, bench, measured, seconds)
         measurement.write_camera(measured, folder)
@@ -224,7 +227,7 @@ def _run(mesh: Mesh, name: str, out: Path, aperture: float | None, settings: Set
         measurement.write_heights(measured, folder, settings.zygo)
         costs, notes = costing.result()
         _say(console, "budget", f"of the image: {costs.line}")
-        for note in notes:
+        for note in notes.values():
             _say(console, "note", note)
         missing = None if scene is None else scene.result()
         files = sorted(file.name for file in folder.iterdir())

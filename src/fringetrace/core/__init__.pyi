@@ -48,4 +48,4 @@ from .vectors import (
     unit as unit,
 )
 from .version import __version__ as __version__
-from .warnings import FringetraceWarning as FringetraceWarning
+from .warnings import FringetraceWarning as FringetraceWarning, warn as warn, warn_once as warn_once

@@ -1,3 +1,4 @@
+from .checks import aliasing as aliasing
 from .coherent_sum import (
     Choice as Choice,
     PixelLight as PixelLight,

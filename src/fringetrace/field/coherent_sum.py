@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, groupby
 from typing import Protocol
@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import ComplexArray, FloatArray, checked_wavelength
+from fringetrace.field.checks import warn_of_aliasing
 from fringetrace.field.ray_sum import RaySum
 from fringetrace.scene import Beam, Scene, Spectrum
 from fringetrace.tracing import Paths, at_wavelength, join, needs
@@ -173,8 +174,15 @@ def complex_field(
         For a wavelength that is none, or goes another way than that of the trace; for an unknown method,
         paths without a CCD, or no paths at all;
         with "wavefront", for paths that are not of a beam; for groups that do not fit the paths.
+
+    Warns
+    -----
+    FringetraceWarning
+        If fringes alias, once of the same paths.
     """
-    return light_on(paths, wavelength, method).complex_field(wavelength, groups, half_wave_loss)
+    return light_on(_watched(paths, wavelength), wavelength, method).complex_field(
+        wavelength, groups, half_wave_loss
+    )
 
 
 def mutual_intensity(
@@ -206,10 +214,15 @@ def mutual_intensity(
     ------
     ValueError
         As in `complex_field`.
+
+    Warns
+    -----
+    FringetraceWarning
+        As in `complex_field`.
     """
     found = [
         share * one.mutual_intensity(part, groups, half_wave_loss)
-        for share, part, one in _lights(paths, light, method)
+        for share, part, one in _lights(_watched(paths, light), light, method)
     ]
     return np.asarray(np.sum(found, axis=0) if len(found) > 1 else found[0], dtype=np.complex128)
 
@@ -241,9 +254,15 @@ def irradiance(
     ------
     ValueError
         As in `complex_field`.
+
+    Warns
+    -----
+    FringetraceWarning
+        As in `complex_field`.
     """
     found = [
-        share * one.irradiance(part, half_wave_loss) for share, part, one in _lights(paths, light, method)
+        share * one.irradiance(part, half_wave_loss)
+        for share, part, one in _lights(_watched(paths, light), light, method)
     ]
     return np.asarray(np.sum(found, axis=0) if len(found) > 1 else found[0], dtype=np.float64)
 
@@ -300,6 +319,17 @@ def light_on(paths: Paths | Iterable[Paths], wavelength: float, method: str = "a
     from fringetrace.field.wavefront.wavefronts import reconstruct
 
     return reconstruct(beams, wavelength)
+
+
+def _watched(paths: Paths | Iterable[Paths], light: float | Spectrum) -> Iterator[Paths]:
+    """The paths in turn, and a warning if fringes alias: of each chunk, or of all beams together."""
+    parts = (paths,) if isinstance(paths, Paths) else paths
+    for part in parts:
+        yield part
+        if not isinstance(parts, Sequence):
+            warn_of_aliasing((part,), light)
+    if isinstance(parts, Sequence):
+        warn_of_aliasing(parts, light)
 
 
 def _lights(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fringetrace.core import ComplexArray
-from fringetrace.field import centred, chosen, complex_field, mutual_intensity
+from fringetrace.field import centred, chosen, complex_field, light_on, mutual_intensity
 from fringetrace.instruments.arms import Mark
 from fringetrace.scene import Beam, Spectrum
 from fringetrace.tracing import Paths
@@ -73,7 +73,8 @@ def ray_sums(paths: Paths, mark: Mark, wavelength: float) -> ComplexArray:
     count = mark.count(landed)
     landed = centred(landed, max(1, paths.source.shape[1] // paths.ccd.shape[1]))
     orders = range(max(2, int(count.max(initial=0)) + 1))
-    return np.stack([complex_field(landed.where(count == order), wavelength, "rays") for order in orders])
+    parts = (landed.where(count == order) for order in orders)
+    return np.stack([light_on(part, wavelength, "rays").complex_field(wavelength) for part in parts])
 
 
 def add_orders(one: ComplexArray, other: ComplexArray, axes: int = 1) -> ComplexArray:

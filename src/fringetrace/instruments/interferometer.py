@@ -106,6 +106,17 @@ class Interferometer:
         """Wavelengths (metres) of the traces so far; None: one trace for all wavelengths."""
         return tuple(self.derived.get("traced", ()))
 
+    @property
+    def warned(self) -> set[str]:
+        """Names of the warnings that were given; none is given twice."""
+        given: set[str] = self.derived.setdefault("warned", set())
+        return given
+
+    def _check(self, light: Light) -> None:
+        """Warn of an image that cannot be trusted, at its shortest wavelength."""
+        shortest = float(self.spectrum(light).wavelengths[0])
+        checks.check(self.trace(shortest), shortest, self.method)
+
     def trace(
         self,
         wavelength: float | None = None,
@@ -133,6 +144,11 @@ class Interferometer:
         ------
         ValueError
             For a wavelength that is missing, or outside the range of a material.
+
+        Warns
+        -----
+        FringetraceWarning
+            As `fringetrace.trace`.
         """
         kept: Paths | None = self.derived.get("paths")
         served = None if kept is None else _served(self.derived.get("served", kept), kept, wavelength)
@@ -140,7 +156,7 @@ class Interferometer:
             at = None if needs(self.scene) is None else wavelength
             self.derived["paths"] = served = trace(
                 self.scene, self.beam, self.ccd, wavelength=at, max_bounces=self.max_bounces,
-                min_amplitude=self.min_amplitude, progress=progress, threads=threads,
+                min_amplitude=self.min_amplitude, progress=progress, threads=threads, warn=self.warned,
             )  # fmt: skip
             self.derived["traced"] = [*self.traced, at]
         self.derived["served"] = served
@@ -162,7 +178,7 @@ class Interferometer:
         beam = replace(self.beam, shape=shape)
         return trace(
             self.scene, beam, self.ccd, wavelength=wavelength, max_bounces=self.max_bounces,
-            min_amplitude=self.min_amplitude, record=True,
+            min_amplitude=self.min_amplitude, record=True, warn=False,
         )  # fmt: skip
 
     def shut(self, arm: str) -> Interferometer:
@@ -304,7 +320,7 @@ class Interferometer:
         total = np.zeros((2, *components, *self.ccd.shape), dtype=np.complex128)
         chunks = stream(
             self.scene, self.beam, self.ccd, wavelength=wavelength, max_bounces=self.max_bounces,
-            min_amplitude=self.min_amplitude, progress=progress, threads=threads,
+            min_amplitude=self.min_amplitude, progress=progress, threads=threads, warn=self.warned,
         )  # fmt: skip
         for paths in chunks:
             total = add_orders(total, ray_sums(paths, self.arms.reference, wavelength))
@@ -323,6 +339,7 @@ class Interferometer:
         -------
         (rows, columns) complex128, or (3, rows, columns) of polarised light
         """
+        self._check(wavelength)
         fields = self.fields(wavelength)
         turns = self.arms.phasors(step, len(fields))
         return np.asarray(np.tensordot(turns, fields, axes=1), dtype=np.complex128)
@@ -347,10 +364,10 @@ class Interferometer:
         Warns
         -----
         FringetraceWarning
-            Where fringes alias, pixels starve or waves fold, see `fringetrace.accuracy.checks`.
+            Where fringes alias, pixels starve or waves fold, and as `fringetrace.trace`; each once, see
+            `fringetrace.accuracy.checks`.
         """
-        shortest = float(self.spectrum(light).wavelengths[0])
-        checks.check(self.trace(shortest), shortest, self.method)
+        self._check(light)
         image = recorded(self.mutual(light), self.arms, step)
         return np.sqrt(image) if modulus else image
 
@@ -372,8 +389,14 @@ class Interferometer:
         ------
         ValueError
             If there are fewer than 3 steps.
+
+        Warns
+        -----
+        FringetraceWarning
+            As `interferogram`.
         """
         shifts = phase_shifts(steps)
+        self._check(light)
 
         def frames() -> FloatArray:
             return np.stack([recorded(self.mutual(light), self.arms, shift) for shift in shifts])
@@ -396,6 +419,11 @@ class Interferometer:
         -------
         (rows, columns) float64, radians
             Carrier included; NaN where either arm brings no light.
+
+        Warns
+        -----
+        FringetraceWarning
+            As `interferogram`.
         """
         return wrapped_phase(self.phase_steps(wavelength, steps), self.mutual(wavelength))
 
@@ -417,6 +445,11 @@ class Interferometer:
         ------
         ValueError
             If there are fewer than 3 steps, or no pixel with light from both arms.
+
+        Warns
+        -----
+        FringetraceWarning
+            As `interferogram`.
         """
         return path_difference(self.wrapped(wavelength, steps), self.carrier(wavelength), wavelength)
 
@@ -438,6 +471,11 @@ class Interferometer:
         ------
         ValueError
             As `path_difference`.
+
+        Warns
+        -----
+        FringetraceWarning
+            As `interferogram`.
         """
         path = self.path_difference(wavelength, steps)
         return np.asarray(path / (-2.0 * self.arms.index(wavelength)), dtype=np.float64)
@@ -458,10 +496,7 @@ class Interferometer:
         FringetraceWarning
             As `interferogram`, and where facets cost over 1/20 wave.
         """
-        checks.check(self.trace(wavelength), wavelength, self.method)
-        costs = budget(self.trace(wavelength), wavelength, self.method)
-        checks.check_budget(costs)
-        return costs
+        return budget(self.trace(wavelength), wavelength, self.method)
 
     def dataset(self, wavelength: float, steps: int = 4) -> Dataset:
         """Labelled dataset of all that is recorded at a wavelength, for xarray and NetCDF.

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import add
 
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import ComplexArray, FloatArray, checked_wavelengths, short_repr
+from fringetrace.core import ComplexArray, FloatArray, checked_wavelengths, short_repr, warn_once
 from fringetrace.field import TOLERANCE, spectrum
 from fringetrace.scattering.detectors import Detector, Pixels, fraunhofer_paths, sides, towards
 from fringetrace.scattering.illumination import Illumination
 from fringetrace.scene import Beam, Scene
-from fringetrace.tracing import Fate, Paths, Rays, needs, stream
+from fringetrace.tracing import Fate, Losses, Paths, Rays, needs, stream
 
 FATES = ("reflected", "transmitted", "missed", "absorbed", "truncated")
 # Rays whose sums are taken at once: 100 MB of paths.
@@ -36,6 +38,8 @@ class Far:
     shares : dict
         Parts of the incident power by what became of it, see `FATES`; means over wavelengths.
     incident : float, m^2 (rays)
+    losses : Losses
+        What was not followed to its end.
     """
 
     amplitude: ComplexArray
@@ -43,6 +47,7 @@ class Far:
     rays: npt.NDArray[np.int64]
     shares: dict[str, float]
     incident: float
+    losses: Losses
 
     __repr__ = short_repr
 
@@ -156,6 +161,7 @@ def mean(fars: Sequence[Far]) -> Far:
         np.sum([far.rays for far in fars], axis=0),
         {name: float(np.mean([far.shares[name] for far in fars])) for name in FATES},
         fars[0].incident,
+        reduce(add, (far.losses for far in fars)),
     )
 
 
@@ -195,15 +201,17 @@ def far_field(
     total = np.zeros((*size, parts(source), len(waves)), dtype=np.complex128)
     power, count = np.zeros((*size, len(waves))), np.zeros(size, dtype=np.int64)
     shares, incident = np.zeros(len(FATES)), 0.0
+    losses: list[Losses] = []
     bands = _bands(lighting.scene, waves)
     adding = _Adding(lighting, detector, options, wanted & (options.method != "power"))
     for wavelength, band in bands:
         start = lighting.start(source, wavelength)
         for paths in stream(
             lighting.scene, source, wavelength=wavelength, max_bounces=options.max_bounces,
-            min_amplitude=options.min_amplitude, threads=options.threads, chunk=CHUNK,
+            min_amplitude=options.min_amplitude, threads=options.threads, chunk=CHUNK, warn=False,
         ):  # fmt: skip
             shares, incident, kept = shares + _shares(paths), incident + paths.ledger().incident, paths
+            losses.append(Losses.of(paths))
             if options.max_reflections is not None:
                 kept = paths.where(paths.reflections <= options.max_reflections)
             sums, powers, counts = adding.chunk(kept, start, waves[band])
@@ -211,4 +219,22 @@ def far_field(
             power[..., band] += powers[..., None]
             count += counts
     fates = dict(zip(FATES, (shares / incident).tolist(), strict=True))
-    return Far(total, power, count, fates, incident / len(bands))
+    return Far(total, power, count, fates, incident / len(bands), reduce(add, losses))
+
+
+def warn_of_losses(fars: Sequence[Far], given: set[str]) -> None:
+    """Warn of light that was not followed to its end, or came to boundaries in the wrong medium, once each.
+
+    Parameters
+    ----------
+    fars : sequence of Far
+    given : set of str
+        Names of warnings that were given before; those given now are added.
+
+    Warns
+    -----
+    FringetraceWarning
+        Of the one that lost most.
+    """
+    for far in sorted(fars, key=lambda far: -far.losses.share):
+        warn_once(far.losses.problems, given)

@@ -13,7 +13,7 @@ from fringetrace.accuracy import hit_error
 from fringetrace.core import FloatArray, FringetraceWarning, array, checked_wavelengths
 from fringetrace.optics import PolarisationLike, jones_states
 from fringetrace.scattering.detectors import Cells, Cones, Detector, Pixels, checked_angles
-from fringetrace.scattering.far_fields import FATES, Far, FarFieldOptions, far_field, mean
+from fringetrace.scattering.far_fields import FATES, Far, FarFieldOptions, far_field, mean, warn_of_losses
 from fringetrace.scattering.illumination import (
     Illumination,
     SourceFunction,
@@ -150,6 +150,7 @@ def amplitudes(
         far_field(lighting, *pair, detector, waves, summed, jones=jones)
         for pair, (jones,) in zip(pairs, lights, strict=True)
     ]
+    warn_of_losses(fars, set())
     sums = np.reshape([far.amplitude for far in fars], (len(theta), len(phi), *fars[0].amplitude.shape))
     unit = {"units": "m2", "long_name": "sum of area * amplitude", "method": method}
     where = _coordinates(theta, phi, detector, waves)
@@ -173,6 +174,7 @@ def brdf(
     polarisation: PolarisationLike = None,
     reciprocal: bool = False,
     progress: Callable[[int, int], None] | None = None,
+    warned: set[str] | None = None,
     **options: Any,
 ) -> DataArray:
     """Bidirectional reflectance distribution function (BRDF), radiance over incident irradiance.
@@ -211,6 +213,8 @@ def brdf(
         become p and not go back as s. See `reciprocity`.
     progress : callable, optional
         Called with (incidences done, incidences in all).
+    warned : set of str, optional
+        Names of warnings that were given before, and are not given again; see `trace`.
     options
         max_bounces : int, surfaces that a path may meet, default 100;
         min_amplitude : float, branches below this part of the launched amplitude are cut off, default 1e-6;
@@ -236,6 +240,11 @@ def brdf(
         For angles, wavelengths or lengths out of range, an unknown method, "diffraction" onto pixels,
         a polarisation that is none or beside a source, `reciprocal` without the same angles on both
         sides or with polarised light.
+
+    Warns
+    -----
+    FringetraceWarning
+        As `trace`, once of all incidences; with "diffraction", if rays are too far apart.
 
     Notes
     -----
@@ -264,6 +273,7 @@ def brdf(
         fars.append(mean(each))
         if progress is not None:
             progress(i + 1, len(pairs))
+    warn_of_losses(fars, set() if warned is None else warned)
     values = np.stack([_density(far, detector, waves, method) for far in fars])
     if reciprocal:
         square = values.reshape(len(pairs), len(pairs), -1)
@@ -383,5 +393,5 @@ def rounding_error(scene: Scene, theta: float, wavelength: float, **options: Any
     limits |= {name: options[name] for name in limits if name in options}
     lighting = Illumination(scene, rays=(1, PROBES), **known)
     at = None if needs(scene) is None else wavelength
-    paths = trace(scene, lighting.light(theta, 0.0), wavelength=at, record=True, **limits)
+    paths = trace(scene, lighting.light(theta, 0.0), wavelength=at, record=True, warn=False, **limits)
     return hit_error(paths.where((paths.fate == Fate.LEFT) & (paths.bounces > 0)), wavelength)

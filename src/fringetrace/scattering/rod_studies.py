@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import FloatArray, array, checked_wavelengths, degree, grid, sweep
+from fringetrace.core import FloatArray, array, checked_wavelengths, degree, grid, sweep, warn
 from fringetrace.optics import Polarisation, PolarisationName
 from fringetrace.rigorous import differential_width, reflectance_spectrum, scatter
 from fringetrace.scattering.detectors import Cones, checked_angles
@@ -19,6 +19,7 @@ from fringetrace.scattering.far_fields import FATES
 from fringetrace.scattering.goniometer import AXES, METHODS, brdf
 from fringetrace.scattering.rod_lattice import MEDIA, RodLattice as RodLattice
 from fringetrace.scattering.rod_solvers import lattice_cylinders, lattice_gratings, lattice_validity
+from fringetrace.tracing import CUT, CUT_OFF
 
 if TYPE_CHECKING:
     from xarray import DataArray
@@ -49,7 +50,7 @@ def _cell(
     table = brdf(
         lattice.scene, theta_i, Cones(np.asarray(theta_o), half_angle), wavelengths, method=method,
         polarisation=TRACED[polarisation], rays=(1, rays), max_bounces=max_bounces,
-        min_amplitude=min_amplitude, threads=1, **lattice.lighting,
+        min_amplitude=min_amplitude, threads=1, warned={CUT_OFF}, **lattice.lighting,
     )  # fmt: skip
     return {"brdf": table.values, **{name: table[name].values for name in FATES}}
 
@@ -242,6 +243,11 @@ def study(
     ------
     ValueError
         For a parameter that a lattice does not have, and as `RodLattice` and `goniometer.brdf`.
+
+    Warns
+    -----
+    FringetraceWarning
+        If over a millionth of the power is cut off, once of all lattices.
     """
     known = [field.name for field in fields(RodLattice)]
     for name in axes:
@@ -268,6 +274,7 @@ def study(
     }
     cells = [_spoken(kind) | fixed | {"indices": each} for kind, each in zip(kinds, indices, strict=True)]
     done = sweep(partial(_cell, media=media), cells, folder, **sweeping)
+    _warn_of_losses(done, [{name: _spoken(kind)[name] for name in axes} for kind in kinds], fixed)
     attributes = {"method": method, "polarisation": polarisation, "half_angle_rad": half_angle}
     attributes |= validity_attributes(kinds, waves) | {
         f"lattice_{name}": int(value) if isinstance(value, bool) else value
@@ -275,6 +282,19 @@ def study(
         if name not in axes and value is not None
     }
     return _table(done, axes, (incidence, observation, waves), attributes)
+
+
+def _warn_of_losses(
+    done: Sequence[Mapping[str, FloatArray]], kinds: Sequence[Mapping[str, Any]], fixed: Mapping[str, Any]
+) -> None:
+    """Warn of power that was cut off: of how many lattices, and of the one that lost most."""
+    shares = np.array([np.nan_to_num(one["truncated"]).max() for one in done])
+    if (lossy := shares > CUT).any():
+        warn(
+            f"{CUT_OFF}: up to {shares.max():.2g} of the incident power in {lossy.sum()} of {len(shares)} "
+            f"lattices, most at {kinds[int(shares.argmax())]}; allow more bounces than "
+            f"{fixed['max_bounces']}, or a smaller least amplitude than {fixed['min_amplitude']:g}"
+        )
 
 
 def _table(

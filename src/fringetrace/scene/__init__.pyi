@@ -1,6 +1,7 @@
 from .coplanar import planes as planes
 from .facet_groups import group_facets as group_facets
 from .model import Scene as Scene, Surface as Surface
+from .open_edges import Opening as Opening, openings as openings
 from .sensor import (
     CCD as CCD,
     crop as crop,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fringetrace.accuracy import checks
+from fringetrace.accuracy import checks, judge
 from fringetrace.core import (
     Array,
     ComplexArray,
@@ -90,20 +90,20 @@ class Run:
         return found
 
     def traced(self, beam: Beam, ccd: CCD | None, wavelength: float | None, record: bool = False) -> Paths:
-        """Trace one beam through the scene."""
+        """Trace one beam through the scene; what there is to warn of is said beside the budget."""
         return trace(
             self.experiment.scene, beam, ccd, wavelength=wavelength, max_bounces=self.experiment.max_bounces,
-            min_amplitude=self.experiment.min_amplitude, record=record,
+            min_amplitude=self.experiment.min_amplitude, record=record, warn=False,
         )  # fmt: skip
 
     def image(self, wavelength: float) -> FloatArray:
         """Irradiance |E|^2, (rows, columns)."""
 
         def find() -> FloatArray:
-            if self.bench is None:
-                return irradiance(self.paths(wavelength), wavelength, self.method)
             with warnings.catch_warnings():  # they are said beside the budget
                 warnings.simplefilter("ignore", FringetraceWarning)
+                if self.bench is None:
+                    return irradiance(self.paths(wavelength), wavelength, self.method)
                 return self.bench.interferogram(wavelength)
 
         found: FloatArray = self.kept(("image", wavelength), find)
@@ -186,14 +186,16 @@ def _traced(current: Run, wavelength: float) -> Iterator[tuple[str, str]]:
         for item in ("detected", "left", "absorbed", "truncated")
     )
     yield "power", f"{shares}; unaccounted for {power.error:.1e} of the incident"
-    if every[0].ccd is None:
-        return
     for number, paths in enumerate(every):
-        choice = choose(paths, current.method)
-        yield "method", str(choice)
-        costs, notes = checks.judge(paths, wavelength, choice.method)
-        yield "budget", f"{f'beam {number}' if len(every) > 1 else 'of the image'}: {costs.line}"
-        yield from (("note", note) for note in notes)
+        if paths.ccd is None:
+            problems = checks.found(paths, wavelength)
+        else:
+            choice = choose(paths, current.method)
+            yield "method", str(choice)
+            costs, problems = judge(paths, wavelength, choice.method)
+            yield "budget", f"{f'beam {number}' if len(every) > 1 else 'of the image'}: {costs.line}"
+        paths.warned.update(problems)
+        yield from (("note", note) for note in problems.values())
 
 
 def _named(wavelength: float) -> str:

@@ -1,4 +1,5 @@
 from . import detection as detection
+from .checks import CUT as CUT, CUT_OFF as CUT_OFF, Losses as Losses
 from .detection import components as components, landed as landed, project as project
 from .fates import DETECTED as DETECTED, Fate as Fate
 from .intersect.bodies import Float32 as Float32, float32_hits as float32_hits

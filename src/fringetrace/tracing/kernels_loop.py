@@ -41,7 +41,7 @@ from fringetrace.tracing.kernels_boundary import (
     strength,
 )
 from fringetrace.tracing.kernels_rays import (
-    fated,
+    fate_ahead,
     latest,
     read_hit,
     read_ray,
@@ -139,6 +139,7 @@ def interact(
     # loops and branches, 100 ns a ray
     batch, ends = Batch(*batch_columns), Ends(*end_columns)
     surfaces, limits = SurfaceTable(*surface_columns), TraceLimits(*limit_columns)
+    screen, has_screen, most = limits.screen, limits.has_screen, limits.max_bounces
     state, last, came, crossed = batch.state, batch.last, batch.came, batch.crossed
     key, ray, bounces, serial = batch.key, batch.ray, batch.bounces, batch.serial
     lost, amplitude, reflections = batch.lost, batch.amplitude, batch.reflections
@@ -173,7 +174,7 @@ def interact(
             else:
                 field = value, 0j, 0j, 0j
         k, gone_through = triangle[row], False
-        fate, reach = fated(limits, steps, k >= 0, path, x, y, z, dx, dy, dz)
+        fate, reach = fate_ahead(screen, has_screen, most, steps, k >= 0, path, x, y, z, dx, dy, dz)
         step = path if fate == ALIVE else reach
         if light_columns is None:
             way += step
@@ -322,6 +323,7 @@ def rebound(
     Returns how many rays go on, how many have ended, and how many hits were doubtful.
     """
     batch, ends, limits = Batch(*batch_columns), Ends(*end_columns), TraceLimits(*limit_columns)
+    screen, has_screen, most = limits.screen, limits.has_screen, limits.max_bounces
     key, ray, state, last, came = batch.key, batch.ray, batch.state, batch.last, batch.came
     end_key, end_ray, end_bounces = ends.key, ends.ray, ends.bounces
     origin, direction, length, end_fate = ends.origin, ends.direction, ends.length, ends.fate
@@ -356,7 +358,7 @@ def rebound(
                 facing = planes[k, 0] * dx + planes[k, 1] * dy + planes[k, 2] * dz
                 inverted = 1.0 / facing
         path = path * unscale if guess >= 0 else np.inf
-        fate, reach = fated(limits, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz)
+        fate, reach = fate_ahead(screen, has_screen, most, steps, guess >= 0, path, gx, gy, gz, dx, dy, dz)
         if fate != ALIVE:
             end = ray[row] - first
             end_key[end], end_ray[end], end_bounces[end] = key[row], ray[row], steps

@@ -116,15 +116,15 @@ def latest(path, dx, dy, dz, bx, by, bz):
 
 
 @part
-def fated(limits, steps, meets, path, x, y, z, dx, dy, dz):
+def fate_ahead(screen, has_screen, max_bounces, steps, meets, path, x, y, z, dx, dy, dz):
     """What becomes of a ray before it meets a face `path` metres ahead (if any), and its path to the CCD."""
-    if limits.has_screen:
-        reach = lands(limits.screen, path, x, y, z, dx, dy, dz)
+    if has_screen:
+        reach = lands(screen, path, x, y, z, dx, dy, dz)
         if reach < np.inf:
             return DETECTED, reach
     if not meets:
         return LEFT, 0.0
-    return (TRUNCATED if steps >= limits.max_bounces else ALIVE), 0.0
+    return (TRUNCATED if steps >= max_bounces else ALIVE), 0.0
 
 
 @jit

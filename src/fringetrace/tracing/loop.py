@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, ComplexArray
 from fringetrace.tracing.batch import Batch, Ends, Light, columns, part
+from fringetrace.tracing.checks import CROWD, EACH, warn_of_crowd
 from fringetrace.tracing.fates import ABSORBED, ALIVE, DETECTED, FAINT
 from fringetrace.tracing.plan import Plan
 from fringetrace.tracing.record import Record
@@ -60,6 +62,8 @@ def advance(plan: Plan, space: Workspace, first: int, stop: int, ends: Ends | No
     fused = plan.mirrors and ends is not None
     while space.count:
         space.segments += space.count
+        if space.count > max(CROWD, EACH * len(rays)):
+            _warn(plan, space, len(rays), bounces)
         if fused and bounces:
             assert ends is not None
             _rebound(plan, space, bounces, first, ends)
@@ -79,6 +83,13 @@ def advance(plan: Plan, space: Workspace, first: int, stop: int, ends: Ends | No
         contradictions=None if plan.optics.vacuum else space.contradictions.copy(),
         record=record,
     )
+
+
+def _warn(plan: Plan, space: Workspace, launched: int, bounces: int) -> None:
+    """Warn of paths that multiply."""
+    if plan.warned is not None:
+        surface, faintest = plan.engine.owner[space.batch.last[: space.count]], math.sqrt(plan.limits.faint)
+        warn_of_crowd(plan.scene, surface, launched, bounces, faintest, plan.warned)
 
 
 def _bounce(

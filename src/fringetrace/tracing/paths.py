@@ -184,6 +184,12 @@ class Paths:
     def __len__(self) -> int:
         return len(self.ray)
 
+    @property
+    def warned(self) -> set[str]:
+        """Names of the warnings that were given of these paths, and of others of the same trace."""
+        given: set[str] = self.derived.setdefault("warned", set())
+        return given
+
     def where(self, mask: Array) -> Paths:
         """Subset of the paths.
 
@@ -197,7 +203,13 @@ class Paths:
             The incident power, segments and doubtful hits stay those of the whole trace.
         """
         chosen = {name: getattr(self, name)[mask] for name in COLUMNS if getattr(self, name) is not None}
-        return replace(self, **chosen)
+        return self.changed(**chosen)
+
+    def changed(self, **columns: Any) -> Paths:
+        """The same paths with other columns; what was warned of is not warned of again."""
+        paths = replace(self, **columns)
+        paths.derived["warned"] = self.warned
+        return paths
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)} | {"derived": {}}
@@ -438,8 +450,7 @@ def join(parts: Iterable[Paths]) -> Paths:
         else:
             columns[name] = np.concatenate(arrays)
     first = parts[0]
-    return replace(
-        first,
+    return first.changed(
         **columns,
         incident=sum(part.incident for part in parts),
         segments=sum(part.segments for part in parts),

@@ -40,7 +40,8 @@ class TraceLimits(NamedTuple):
 class Plan:
     """Settings of a trace, shared by all threads.
 
-    `passed` are surfaces that rays pass over on their first segment.
+    `passed` are surfaces that rays pass over on their first segment. `warned` are the names of warnings that
+    were given; None: there are to be none.
     """
 
     scene: Scene
@@ -52,6 +53,7 @@ class Plan:
     optics: SceneOptics
     limits: TraceLimits
     record: bool
+    warned: set[str] | None = None
 
     @property
     def total(self) -> int:

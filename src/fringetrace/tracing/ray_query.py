@@ -17,7 +17,7 @@ def retrace(
     max_bounces: int | None = None,
     min_amplitude: float | None = None,
 ) -> Paths:
-    """Trace further rays through the scene of paths, onto their CCD, at their wavelength.
+    """Trace further rays through the scene of paths, onto their CCD, at their wavelength; warn of nothing.
 
     Parameters
     ----------
@@ -38,5 +38,6 @@ def retrace(
         max_bounces = int(paths.bounces[paths.fate == Fate.DETECTED].max(initial=0))
     return trace(
         paths.scene, source, paths.ccd, wavelength=paths.wavelength, max_bounces=max_bounces,
-        min_amplitude=paths.min_amplitude if min_amplitude is None else min_amplitude, record=record,
+        min_amplitude=paths.min_amplitude if min_amplitude is None else min_amplitude,
+        record=record, warn=False,
     )  # fmt: skip

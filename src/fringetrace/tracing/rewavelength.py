@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,7 +52,7 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
     assert paths.bend is not None
     why, seen = needs(paths.scene), paths.fate == Fate.DETECTED
     if why is None:
-        return replace(paths, wavelength=wavelength)
+        return paths.changed(wavelength=wavelength)
     if paths.contradictions is not None and paths.contradictions.any():
         raise ValueError(
             f"wavelength: expected that of the trace, {paths.wavelength:.6g} m, since rays came to surfaces "
@@ -69,8 +68,7 @@ def at_wavelength(paths: Paths, wavelength: float) -> Paths:
     phase = 2.0 * math.pi * (new.imag / wavelength - old.imag / paths.wavelength)
     factor = np.exp(-(paths.lengths @ phase)) * _ratio(paths, wavelength)
     _check_cut(paths, factor, wavelength)
-    return replace(
-        paths,
+    return paths.changed(
         length=paths.length + paths.lengths @ (new.real - old.real),
         amplitude=paths.amplitude * (factor if paths.field is None else np.abs(factor)),
         field=None if paths.field is None else paths.field * factor[:, None],

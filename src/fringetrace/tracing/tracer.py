@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from fringetrace.core import ComplexArray, checked_whole
+from fringetrace.core import ComplexArray, checked_whole, warn_once
 from fringetrace.scene import CCD, Beam, Scene, screen
 from fringetrace.tracing.batch import Ends, Light, blank, part
+from fringetrace.tracing.checks import Losses
 from fringetrace.tracing.loop import Chunk, advance
 from fringetrace.tracing.paths import Paths, join
 from fringetrace.tracing.plan import Plan, TraceLimits
@@ -71,7 +72,9 @@ def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
     return formed(scene, engine)
 
 
-def _plan(scene: Scene, source: Beam | Rays, ccd: CCD | None, options: Options) -> Plan:
+def _plan(
+    scene: Scene, source: Beam | Rays, ccd: CCD | None, options: Options, warned: set[str] | None
+) -> Plan:
     if not isinstance(scene, Scene):
         raise TypeError(f"trace: expected a Scene, got {type(scene).__name__}")
     if not isinstance(source, (Beam, Rays)):
@@ -94,7 +97,7 @@ def _plan(scene: Scene, source: Beam | Rays, ccd: CCD | None, options: Options) 
         key_base=len(scene.digits) + 1,
     )
     forms = _forms(scene, engine)
-    return Plan(scene, source, ccd, engine, forms, passed, met, limits, options.record)
+    return Plan(scene, source, ccd, engine, forms, passed, met, limits, options.record, warned)
 
 
 def _paths(plan: Plan, chunk: Chunk) -> Paths:
@@ -249,21 +252,29 @@ def stream(
     threads: int | None = None,
     chunk: int | None = None,
     progress: Progress | None = None,
+    warn: bool | set[str] = True,
 ) -> Iterator[Paths]:
     """Trace in chunks, which need not fit into memory together; arguments as for `trace`.
 
     Parameters
     ----------
-    scene, source, ccd, wavelength, max_bounces, min_amplitude, record, threads, chunk, progress
+    scene, source, ccd, wavelength, max_bounces, min_amplitude, record, threads, chunk, progress, warn
         See `trace`.
 
     Yields
     ------
     Paths
         Of consecutive rays, in their order.
+
+    Warns
+    -----
+    FringetraceWarning
+        Behind the last of them, as `trace`.
     """
     options = Options(wavelength, max_bounces, min_amplitude, record, threads, chunk, progress)
-    return _in_chunks(_plan(scene, source, ccd, options), options)
+    plan = _plan(scene, source, ccd, options, _given(warn))
+    chunks = _in_chunks(plan, options)
+    return chunks if plan.warned is None else _warned(chunks, plan.warned)
 
 
 def trace(
@@ -278,6 +289,7 @@ def trace(
     threads: int | None = None,
     chunk: int | None = None,
     progress: Progress | None = None,
+    warn: bool | set[str] = True,
 ) -> Paths:
     """Trace rays through a scene until they are detected, leave, or are cut off.
 
@@ -303,6 +315,9 @@ def trace(
         same bits for any number.
     progress : callable, optional
         Called with (rays done, rays in all) after each chunk.
+    warn : bool or set of str
+        False: warn of nothing. A set: the names of warnings that were given before, and are not given again;
+        those given now are added.
 
     Returns
     -------
@@ -315,9 +330,36 @@ def trace(
     ValueError
         For counts or amplitudes below 0, or names of unknown surfaces in the source's `passes`; for a
         wavelength that is missing, or outside the range of a material.
+
+    Warns
+    -----
+    FringetraceWarning
+        If over a millionth of the power is cut off, media contradict, a boundary is open, or paths multiply;
+        see `fringetrace.tracing.checks`.
     """
     options = Options(wavelength, max_bounces, min_amplitude, record, threads, chunk, progress)
-    plan = _plan(scene, source, ccd, options)
-    if not (plan.optics.splits or record):
-        return _at_once(plan, options)
-    return join(list(_in_chunks(plan, options)))
+    plan = _plan(scene, source, ccd, options, _given(warn))
+    parted = plan.optics.splits or record
+    paths = join(list(_in_chunks(plan, options))) if parted else _at_once(plan, options)
+    if plan.warned is not None:
+        paths.derived["warned"] = plan.warned
+        warn_once(Losses.of(paths).problems, plan.warned)
+    return paths
+
+
+def _given(warn: bool | set[str]) -> set[str] | None:
+    """Names of the warnings that were given before; None: there are to be no warnings."""
+    if isinstance(warn, set):
+        return warn
+    return set() if warn else None
+
+
+def _warned(chunks: Iterator[Paths], given: set[str]) -> Iterator[Paths]:
+    """Chunks of a trace, and warnings behind the last of them."""
+    losses: Losses | None = None
+    for paths in chunks:
+        paths.derived["warned"] = given
+        losses = Losses.of(paths) if losses is None else losses + Losses.of(paths)
+        yield paths
+    if losses is not None:
+        warn_once(losses.problems, given)

@@ -15,7 +15,7 @@ import numpy as np
 
 from fringetrace import views
 from fringetrace.core import ComplexArray, FloatArray
-from fringetrace.field import complex_field, irradiance
+from fringetrace.field import light_on
 from fringetrace.scene import CCD, Beam, Scene
 from fringetrace.tracing import Paths, trace
 from fringetrace.validation import float32_tracer
@@ -166,13 +166,13 @@ def run_standard(
     def once() -> tuple[float, Paths, ComplexArray]:
         begin = time.perf_counter()
         paths = method.tracer(standard.scene, standard.lit(count), standard.ccd)
-        field = complex_field(paths, WAVELENGTH, method.sum)
+        field = light_on(paths, WAVELENGTH, method.sum).complex_field(WAVELENGTH)
         return time.perf_counter() - begin, paths, field
 
     seconds, paths, field = once()
     for _ in range(repeats - 1 if seconds < LONG else 0):
         seconds = min(seconds, once()[0])
-    bright = irradiance(paths, WAVELENGTH, method.sum)
+    bright = light_on(paths, WAVELENGTH, method.sum).irradiance(WAVELENGTH)
     return StandardRun(
         standard.title, method.name, count**2, standard.triangles, seconds,
         phase_error(field, truth[0]), irradiance_error(bright, truth[1]),

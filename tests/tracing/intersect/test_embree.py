@@ -20,6 +20,9 @@ from fringetrace.geometry import shapes
 from fringetrace.tracing.intersect.embree import build
 from fringetrace.tracing.paths import join
 
+# Rays are cut off on purpose: what becomes of them is looked at here, that it is warned of in `test_checks`.
+pytestmark = pytest.mark.filterwarnings("ignore:power is cut off")
+
 MIRROR = ft.Mirror()
 # Distances are good to this part of the path: a few hundred roundings of float64.
 DISTANCE = 1e-12

@@ -151,9 +151,12 @@ def crossing(planes, tri, x, y, z, dx, dy, dz):
 
 @part
 def unsure(guess, again, path, facing, own, leaving, closed):
-    """Whether float32 is in doubt, edges aside; `again`: it names the triangle just left."""
+    """Whether float32 is in doubt, edges aside; `again`: it names the triangle just left.
+
+    A guess of -1 is a miss, of -2 no answer.
+    """
     if guess < 0:
-        return own & closed & (leaving < 0.0)
+        return (guess < -1) | (own & closed & (leaving < 0.0))
     measurable = (path > MARGIN) & (path < 1e300) & (abs(facing) > FLAT)
     return (not measurable) | (own & (again | (closed & (facing * leaving >= 0.0))))
 

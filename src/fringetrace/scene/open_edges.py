@@ -1,0 +1,147 @@
+"""Open edges of bodies of glass: holes through which rays pass between media without meeting a boundary."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fringetrace.core import Array, FloatArray, short_repr
+from fringetrace.geometry import IndexArray, Mesh, weld
+from fringetrace.scene.model import Scene
+
+# A mesh is meant to close if its vector area is a smaller part of its area than this: of a closed mesh it
+# is 0, of a cube without a face 1/5, of half a sphere 1/2, of a flat sheet 1.
+SHEET = 1.0 / 3.0
+# Prisms and rods without ends stand for endless ones: all normals lie across an axis, to this part.
+PRISM = 1e-9
+# A hole whose vector area is a smaller part of its squared outline is a seam: vertices on another's edge.
+SEAM = 1e-9
+# Random bits of vertices repeat with this period, by which a mesh with open edges cannot look closed.
+SEED = 20250
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """A hole in the boundary between two media.
+
+    Attributes
+    ----------
+    surface : int
+        Number of the surface that has the first of its edges.
+    edges : (k, 2) int64
+        Its edges on that surface, by the vertices of its mesh.
+    area : float, m^2
+    centre : (3,) float64, metres
+    """
+
+    surface: int
+    edges: IndexArray
+    area: float
+    centre: FloatArray
+
+    __repr__ = short_repr
+
+
+def openings(scene: Scene) -> tuple[Opening, ...]:
+    """Holes in boundaries that are closed but for them, largest first; found once and kept with the scene.
+
+    Edges count as joined where they have the same end points, within a surface or among boundaries. Sheets,
+    prisms without ends, and seams at which no area is left open, have none.
+
+    Parameters
+    ----------
+    scene : Scene
+
+    Returns
+    -------
+    tuple of Opening
+    """
+    if "openings" not in scene.derived:
+        scene.derived["openings"] = _openings(scene)
+    found: tuple[Opening, ...] = scene.derived["openings"]
+    return found
+
+
+def _openings(scene: Scene) -> tuple[Opening, ...]:
+    numbers = [i for i, surface in enumerate(scene.surfaces) if surface.boundary]
+    meshes = {i: scene.surfaces[i].mesh for i in numbers}
+    suspected = [i for i in numbers if not (_closed(meshes[i].faces) or _sheet(meshes[i]))]
+    if not suspected:
+        return ()
+    start = dict(
+        zip(numbers, np.cumsum([0, *(len(mesh.vertices) for mesh in meshes.values())]), strict=False)
+    )
+    vertices = np.concatenate([mesh.vertices for mesh in meshes.values()])
+    faces = np.concatenate([mesh.faces + start[i] for i, mesh in meshes.items()])
+    owner = np.repeat(numbers, [len(mesh.faces) for mesh in meshes.values()])
+    points, welded = weld(vertices, faces)
+    edges, here = _open_edges(welded)
+    hole = _loops(edges)
+    found = []
+    for number in range(int(hole.max(initial=-1)) + 1):
+        mine = np.flatnonzero(hole == number)
+        surface = int(owner[here[mine[0]] // 3])
+        area, centre, seam = _measured(points[edges[mine]])
+        if surface in suspected and not seam:
+            mine = mine[owner[here[mine] // 3] == surface]
+            found.append(Opening(surface, _sides(faces)[here[mine]] - start[surface], area, centre))
+    return tuple(sorted(found, key=lambda opening: -opening.area))
+
+
+def _sides(faces: IndexArray) -> IndexArray:
+    """Directed edges of faces, (3 f, 2)."""
+    return np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
+
+
+def _closed(faces: IndexArray) -> bool:
+    """Whether each edge is run through as often one way as the other; told by hashes, without sorting.
+
+    The sum of h(a) g(b) - h(b) g(a) over all edges (a, b) is 0 if so, and else with a chance of 1 in 2^64.
+    """
+    bits = np.random.default_rng(SEED).integers(0, 2**64, (2, int(faces.max()) + 1), dtype=np.uint64)
+    one, other = bits[0][faces], bits[1][faces]
+    total = (one * np.roll(other, -1, axis=1) - np.roll(one, -1, axis=1) * other).sum(dtype=np.uint64)
+    return bool(total == 0)
+
+
+def _sheet(mesh: Mesh) -> bool:
+    """Whether a mesh is not meant to close: it is flat, a bowl, or a prism without ends."""
+    corners = mesh.vertices[mesh.faces]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas /= np.abs(areas).max()
+    along, *_, most = np.linalg.eigvalsh(areas.T @ areas)
+    total = np.linalg.norm(areas, axis=1).sum()
+    return bool(along < PRISM**2 * most or np.linalg.norm(areas.sum(axis=0)) > SHEET * total)
+
+
+def _open_edges(faces: IndexArray) -> tuple[IndexArray, npt.NDArray[np.int64]]:
+    """Edges that only one face has, (k, 2), and their rows among `_sides`."""
+    sides = _sides(faces)
+    low, high = sides.min(axis=1), sides.max(axis=1)
+    _, first, count = np.unique(low * (faces.max() + 1) + high, return_index=True, return_counts=True)
+    rows = first[count == 1]
+    return sides[rows], rows
+
+
+def _loops(edges: IndexArray) -> Array:
+    """The connected part that each edge belongs to, from 0 on."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    if len(edges) == 0:
+        return np.empty(0, dtype=np.int64)
+    vertex, ends = np.unique(edges, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (len(vertex), len(vertex)))
+    return np.asarray(connected_components(graph, directed=False)[1][ends[:, 0]], dtype=np.int64)
+
+
+def _measured(ends: FloatArray) -> tuple[float, FloatArray, bool]:
+    """Area and centre of a hole with edges (k, 2, 3), and whether it is but a seam."""
+    centre = ends.mean(axis=(0, 1))
+    spokes = ends - centre
+    area = 0.5 * float(np.linalg.norm(np.cross(spokes[:, 0], spokes[:, 1]).sum(axis=0)))
+    outline = float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+    return area, centre, area <= SEAM * outline**2
