@@ -542,7 +542,9 @@ class _Judge:
         )
         ended = last & (paths.fate[row] != Fate.LEFT)
         height, inside = self.faces.heights(self.points[row, begin])
-        apart = 64.0 * self.tight + np.where(begin == 1, self.loose[row], 0.0)[:, None]
+        slope = np.abs(coming @ self.faces.normal.T) / np.linalg.norm(coming, axis=1, keepdims=True)
+        blur = self.loose[row][:, None] / np.maximum(slope, FLAT)  # of the first point, in each face
+        apart = 64.0 * self.tight + np.where((begin == 1)[:, None], blur, 0.0)
         near = (np.abs(height) <= 5.0 * self.tight) & (inside > -apart) & ~self.faces.formed
         contains = near & (np.abs(height) <= 0.1 * self.tight) & (inside > apart)
         for way in (coming, going):  # what runs along a face need not cross it
