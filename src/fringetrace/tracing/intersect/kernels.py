@@ -338,7 +338,7 @@ def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
             doubt = unsure(guess, guess == left, path, facing, own, leaving, closed)
         else:
             strange = overlooked(guess, facing, leaving, x, y, z, closed, frame[4], planes, tree)
-            if guess < 0 and not strange:
+            if guess == -1 and not strange:
                 continue
             doubt = strange or unsure(guess, guess == left, path, facing, own, leaving, closed)
         look = doubt or rim <= MARGIN or edge < margin
