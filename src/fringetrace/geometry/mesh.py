@@ -18,8 +18,10 @@ from fringetrace.core import (
     filled,
     length_text,
     short_repr,
+    unit,
     value_text,
 )
+from fringetrace.geometry.topology import Topology
 
 # A face is degenerate when its height is below this part of its longest side: less than what
 # float64 coordinates can express, and far below any needle that still has a normal.
@@ -198,11 +200,41 @@ class Mesh:
         doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
         return Mesh(points, triangles[doubled > DEGENERATE * (sides**2).sum(axis=2).max(axis=1)], name)
 
+    @property
+    def corners(self) -> FloatArray:
+        """Corners of the faces, (f, 3, 3) float64, metres."""
+        return self.vertices[self.faces]
+
     @cached_property
     def bounds(self) -> FloatArray:
         """Bounding box of the faces, (2, 3) float64, metres: lower and upper corner."""
-        corners = self.vertices[self.faces].reshape(-1, 3)
+        corners = self.corners.reshape(-1, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """Normals of the faces to the front, (f, 3) float64, unit."""
+        normals = unit(self._crossed)
+        normals.flags.writeable = False
+        return normals
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """Areas of the faces, (f,) float64, m^2."""
+        areas = 0.5 * np.linalg.norm(self._crossed, axis=1)
+        areas.flags.writeable = False
+        return np.asarray(areas)
+
+    @property
+    def _crossed(self) -> FloatArray:
+        """Cross products of two sides of each face, (f, 3) float64, m^2."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Welded vertices, edges and the faces beside them."""
+        return Topology.of(self.vertices, self.faces)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Mesh:
         """Mesh rotated about the origin, then shifted.
