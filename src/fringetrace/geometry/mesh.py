@@ -80,25 +80,23 @@ def _checked_faces(value: Any, count: int, name: str) -> npt.NDArray[np.int64]:
     return np.array(raw, dtype=np.int64)
 
 
-def _checked_extent(corners: FloatArray, name: str) -> float:
-    """Longest side of the box around the corners, once it is known to be measurable."""
+def _checked_extent(corners: FloatArray, name: str) -> tuple[float, npt.NDArray[np.bool_]]:
+    """Longest side of the box around the corners, once known to be measurable; which faces have an area."""
     with np.errstate(over="ignore"):
         extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     if not (extent < LARGEST and (extent == 0.0 or extent > SMALLEST)):
         raise ValueError(f"{name}: expected a size from {SMALLEST:g} to {LARGEST:g} m, got {extent:g} m")
-    return extent
+    sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
+    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return extent, doubled > DEGENERATE * (sides**2).sum(axis=2).max(axis=1)
 
 
 def _check_shape(vertices: FloatArray, faces: npt.NDArray[np.int64], name: str) -> None:
     """Refuse faces without area, and meshes too far off for float64 to resolve."""
     corners = vertices[faces]
-    extent = _checked_extent(corners, name)
+    extent, spread = _checked_extent(corners, name)
     farthest = np.abs(corners).max()
-    sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
-    longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
-    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    bad = np.flatnonzero(~(doubled > DEGENERATE * longest**2))
-    if len(bad):
+    if len(bad := np.flatnonzero(~spread)):
         raise ValueError(
             f"{name} faces: expected triangles with an area, got {len(bad)} of {len(faces)} "
             f"without (faces {_named(bad)}); drop them, or give Mesh.cleaned(...)"
@@ -194,11 +192,7 @@ class Mesh:
         """
         points = _checked_vertices(vertices, name)
         triangles = _checked_faces(faces, len(points), name)
-        corners = points[triangles]
-        extent = _checked_extent(corners, name)
-        sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
-        doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        return Mesh(points, triangles[doubled > DEGENERATE * (sides**2).sum(axis=2).max(axis=1)], name)
+        return Mesh(points, triangles[_checked_extent(points[triangles], name)[1]], name)
 
     @property
     def corners(self) -> FloatArray:
