@@ -22,8 +22,9 @@ EPS = float(np.finfo(np.float64).eps)
 # Points are where they should be within so many roundings of the coordinates, faces are crossed or not
 # where they are farther than that.
 ROUNDINGS = 400.0
-# Float32 may take a ray past a silhouette as near as this, relative to the scene.
-GRAZE = 2.0**-21
+# Float32 may take a ray past a silhouette as near as this, relative to the scene: one that leaves a face
+# flatly starts so far above it.
+GRAZE = 2.0**-20
 # A ray runs along a face if it does so to this cosine.
 FLAT = 1e-4
 PASS, BACK = ft.BeamSplitter(0.0, 1.0), ft.Mirror()
@@ -268,7 +269,7 @@ def case(seed: int, count: int = 1000, kind: str | None = None) -> Case:
     turn = np.eye(3) if rng.uniform() < 0.4 else rotation(rng.normal(size=3), rng.uniform(0, 6))
     offset = np.zeros(3)
     if rng.uniform() < 0.5:
-        offset = rng.uniform(-1, 1, 3) * size * 10.0 ** rng.uniform(0, 8.7)
+        offset = rng.uniform(-1, 1, 3) * size * 10.0 ** rng.uniform(0, 8.3)
     surfaces, spheres = [], {}
     for k, part in enumerate(parts):
         mesh = ft.Mesh(part.mesh.vertices @ turn.T * size + offset, part.mesh.faces)
@@ -382,6 +383,7 @@ class _Judge:
         sides = np.array(table)
         medium, on_edge = np.zeros(len(paths), int), np.zeros(len(paths), bool)
         direction, wrong = paths.source.direction[paths.ray].copy(), np.zeros(len(paths), bool)
+        flattest = np.ones(len(paths))
         for k in range(int(paths.bounces.max(initial=0))):
             rows = np.flatnonzero(paths.bounces > k)
             step = self.points[rows, k + 1] - self.points[rows, k]
@@ -399,7 +401,9 @@ class _Judge:
             apart = self.points[rows, k + 1][:, None] - corners
             inside = np.einsum("nkj,nkj->nk", apart, self.faces.inward[face]).min(axis=1)
             facing = np.einsum("nj,nj->n", direction[rows], normal)
-            on_edge[rows] |= (inside < 64.0 * self.tight + self.loose[rows]) & ~self.faces.formed[face]
+            flattest[rows] = np.clip(np.abs(facing), FLAT, flattest[rows])
+            blur = self.loose[rows] / flattest[rows]  # of the point in the face
+            on_edge[rows] |= (inside < 64.0 * self.tight + blur) & ~self.faces.formed[face]
             on_edge[rows] |= np.abs(facing) < 1e-6  # along a wall, to rounding
             silhouette = np.sqrt(64.0 * (self.tight + self.loose[rows]) / self.case.size)
             on_edge[rows] |= (np.abs(facing) < silhouette) & self.faces.formed[face]
@@ -410,8 +414,10 @@ class _Judge:
             medium[rows] = np.where(boundary, beyond, medium[rows])
             back = np.array([s.interface is BACK for s in scene.surfaces])[surface]
             direction[rows[back]] -= 2.0 * facing[back, None] * normal[back]
+        if all(len(surface.mesh.faces) == 2 for surface in scene.surfaces):  # light gets in from the side
+            wrong &= paths.bounces >= len(scene.surfaces)
         for row in np.flatnonzero(wrong):  # past the edge of something that it should have met
-            room = 64.0 * self.tight + self.loose[row]
+            room = 64.0 * self.tight + self.loose[row] / flattest[row]
             height, inside = self.faces.heights(self.points[row, : paths.bounces[row] + 1])
             wrong[row] = not ((np.abs(height) < room) & (np.abs(inside) < room)).any()
         self.say("media contradict", wrong, np.arange(len(paths)))
@@ -482,11 +488,12 @@ class _Judge:
                 "nkj,nkj->nk", point[:, None] - self.faces.corners[face], self.faces.inward[face]
             ).min(axis=1)
             steep = np.abs(np.einsum("nj,nj->n", step[ray], self.faces.normal[face])) / length[ray]
+            grazes = inside * steep < GRAZE * self.case.size
             leak = inside > room[ray, 0] * (1.0 + 2.0 / steep)
             # past a silhouette, as far as float32 can tell, a ray goes in and out
             graze = np.zeros(len(rows))
             sense = np.sign(np.einsum("nj,nj->n", step[ray], self.faces.normal[face]))
-            np.add.at(graze, ray[leak], np.where(inside < GRAZE * self.case.size, sense, np.inf)[leak])
+            np.add.at(graze, ray[leak], np.where(grazes, sense, np.inf)[leak])
             leak &= (graze[ray] != 0.0) & ~((inside < GRAZE * self.case.size) & (steep < 0.05))
             self.say(f"segments {k} through faces", leak, rows[ray])
             for middle, radius in self.case.spheres.values():
@@ -535,7 +542,9 @@ class _Judge:
         )
         ended = last & (paths.fate[row] != Fate.LEFT)
         height, inside = self.faces.heights(self.points[row, begin])
-        apart = 64.0 * self.tight + np.where(begin == 1, self.loose[row], 0.0)[:, None]
+        slope = np.abs(coming @ self.faces.normal.T) / np.linalg.norm(coming, axis=1, keepdims=True)
+        blur = self.loose[row][:, None] / np.maximum(slope, FLAT)  # of the first point, in each face
+        apart = 64.0 * self.tight + np.where((begin == 1)[:, None], blur, 0.0)
         near = (np.abs(height) <= 5.0 * self.tight) & (inside > -apart) & ~self.faces.formed
         contains = near & (np.abs(height) <= 0.1 * self.tight) & (inside > apart)
         for way in (coming, going):  # what runs along a face need not cross it

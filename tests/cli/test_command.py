@@ -186,8 +186,9 @@ def test_a_measured_surface_goes_through_like_any_mesh(command, tmp_path):
     assert (code, errors) == (0, "")
     assert "metropro-1.dat" in said
     with xarray.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as data:
-        assert data.attrs["residual_rms_away_from_steps_m"] < 632.8 * nm / 1000
-        assert np.isnan(data["residual"]).any()
+        # exact off flat facets: what is left is their slope and curvature within a pixel
+        assert data.attrs["residual_rms_away_from_steps_m"] < 632.8 * nm / 10_000
+        assert np.isfinite(data["residual"]).all()
 
 
 @pytest.mark.slow

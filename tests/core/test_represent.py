@@ -1,6 +1,7 @@
 """Representations: short, useful, and never the numbers of an array."""
 
 import re
+import warnings
 from dataclasses import dataclass, fields, is_dataclass, replace
 from importlib import import_module
 from inspect import isclass
@@ -56,7 +57,9 @@ def things():
     yield mie.efficiencies(1e-7, 1.5, 1.0, 5e-7)
 
 
-THINGS = {type(thing).__name__: thing for thing in things()}
+with warnings.catch_warnings():  # the fringes of so few pixels alias
+    warnings.simplefilter("ignore", ft.FringetraceWarning)
+    THINGS = {type(thing).__name__: thing for thing in things()}
 
 
 def check(text):

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -57,6 +58,15 @@ def test_a_step_of_over_a_quarter_wave_is_named_and_left_out():
     assert sorted(set(columns)) == [26, 27]
     assert found.rms() > 100 * nm
     assert found.rms(~beyond & inner) < 1e-6 * HENE
+
+
+def test_whole_half_wavelengths_may_be_left_out(bumpy):
+    rng = np.random.default_rng(5)
+    orders = rng.integers(-3, 4, bumpy.residual.shape)
+    missed = replace(bumpy, residual=bumpy.residual + 0.5 * HENE * orders)
+    assert np.array_equal(missed.orders, np.where(np.isnan(missed.residual), np.nan, orders), equal_nan=True)
+    assert missed.rms() > HENE / 2
+    assert missed.rms(but_for_orders=True) == pytest.approx(bumpy.rms(), rel=1e-4)  # roundings of HENE / 2
 
 
 def test_the_rms_is_that_of_the_residual(bumpy):

@@ -352,13 +352,14 @@ def _say_result(console: Console, bench: Interferometer, measured: Measurement, 
         f"differs from the mesh by {_rms(measured, valid)} over {valid.mean():.1%} of the pixels, "
         f"{_rms(measured, valid & smooth)} away from steps (over {(valid & smooth).mean():.1%})",
     )
-    jumps = int((np.abs(measured.residual[valid]) > 0.25 * measured.wavelength).sum())
+    jumps = int((measured.orders[valid] != 0.0).sum())
     if jumps:
         _say(
             console,
             "note",
             f"pixels off by whole half wavelengths: {jumps:,}; steps of over a quarter of the wavelength "
-            "between pixels cannot be told from smaller ones at one wavelength",
+            "between pixels cannot be told from smaller ones at one wavelength; but for these the height is "
+            f"off by {_rms(measured, valid & smooth, True)} away from steps",
         )
     _say(
         console,
@@ -367,8 +368,8 @@ def _say_result(console: Console, bench: Interferometer, measured: Measurement, 
     )
 
 
-def _rms(measured: Measurement, where: Array) -> str:
-    rms = measured.rms(where)
+def _rms(measured: Measurement, where: Array, but_for_orders: bool = False) -> str:
+    rms = measured.rms(where, but_for_orders)
     return f"{rms * 1e9:.3g} nm = {rms / measured.wavelength:.2g} waves rms"
 
 

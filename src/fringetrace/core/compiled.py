@@ -10,15 +10,17 @@ from numba import njit
 # No fast mathematics, here or in a caller (numba hands it on): a fused multiplication and addition
 # would round the two sides of an edge differently, and rays would slip through. No wrappers for C, which
 # nobody calls: they take a seventh of the time to compile.
-jit: Any = njit(nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True)
+COMPILED: dict[str, Any] = {
+    "nogil": True, "cache": True, "error_model": "numpy", "no_cfunc_wrapper": True,
+}  # fmt: skip
 
+jit: Any = njit(**COMPILED)
 
 # Makes no array, and counts no references to those it is given: a count is an atomic operation, which takes
 # as long as the test of a box, and longer where threads share the array.
-lean: Any = njit(nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True, _nrt=False)  # type: ignore[call-overload]
+lean: Any = njit(**COMPILED | {"_nrt": False})
 
-
-part: Any = njit(nogil=True, cache=True, error_model="numpy", no_cfunc_wrapper=True, forceinline=True)
+part: Any = njit(**COMPILED | {"forceinline": True})
 
 
 @jit

@@ -81,13 +81,20 @@ class Measurement:
         slope_x, slope_y = path_slope(self.tilt)
         return float(max(abs(slope_x) * columns, abs(slope_y) * rows) * self.pitch / self.wavelength)
 
-    def rms(self, where: Array | None = None) -> float:
+    @property
+    def orders(self) -> FloatArray:
+        """Half wavelengths by which the fringe order is missed, (rows, columns) float64, whole or NaN."""
+        return np.asarray(np.round(2.0 * self.residual / self.wavelength))
+
+    def rms(self, where: Array | None = None, but_for_orders: bool = False) -> float:
         """Root mean square of the residual, metres.
 
         Parameters
         ----------
         where : (rows, columns) bool, optional
             Default: wherever there is a residual.
+        but_for_orders : bool
+            Leave out whole half wavelengths, which one wavelength cannot tell.
 
         Returns
         -------
@@ -95,7 +102,8 @@ class Measurement:
             NaN if there are none.
         """
         chosen = np.isfinite(self.residual) if where is None else where & np.isfinite(self.residual)
-        return float(np.sqrt(np.mean(self.residual[chosen] ** 2))) if chosen.any() else math.nan
+        left = self.residual - (0.5 * self.wavelength * self.orders if but_for_orders else 0.0)
+        return float(np.sqrt(np.mean(left[chosen] ** 2))) if chosen.any() else math.nan
 
 
 def heights(

@@ -13,6 +13,8 @@ from fringetrace.core.vectors import rotation
 from fringetrace.geometry import forms, shapes
 from fringetrace.tracing.intersect import coincident
 
+# Rays are stopped where the tests have seen enough of them.
+pytestmark = pytest.mark.filterwarnings("ignore:power is cut off")
 MIRROR = ft.Mirror()
 # Some straight down onto the middle, on edges between triangles, beside them; some slanting.
 START = np.array([(0.1, 0.2, 2.0), (0.05, 0.05, 2.0), (0.0, 0.0, 2.0), (0.11, -0.2, 2.0)])
@@ -60,6 +62,7 @@ def test_a_pile_of_plates_in_one_mesh_or_in_many():
             assert_each_once(paths, 10)
 
 
+@pytest.mark.filterwarnings("ignore:media contradict")  # from below, where the scene is a vacuum
 def test_three_faces_between_four_media_whatever_their_order():
     media = [1.0, 1.3, 1.7, 1.5]
     faces = [sheet(GLASS, f"face {i}", front=media[i], back=media[i + 1]) for i in range(3)]

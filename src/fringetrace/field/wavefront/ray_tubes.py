@@ -116,7 +116,8 @@ def caustics(
         if leg < way.shape[2] - 2:
             step = way[:, :, leg + 1] - way[:, :, leg]
             reach = np.linalg.norm(step, axis=-1)
-            direction = step / reach[..., None]
+            # where faces touch a segment has no length: what it does to a tube is unknown, and nothing
+            direction = np.divide(step, reach[..., None], where=reach[..., None] > 0.0, out=step * np.nan)
         else:
             direction, reach = arrival, last
         across = np.stack(_across(direction), axis=-2)

@@ -165,6 +165,28 @@ def sheared(dx, dy, dz):
 
 
 @lean
+def beside(planes, order, lower, upper, x, y, z, margin):
+    """Whether a point lies in the box of some triangles and within `margin` of the plane of one."""
+    leaves, node = len(lower) // 2, 1
+    while node > 0:
+        inside = lower[node, 0] <= x <= upper[node, 0] and lower[node, 1] <= y <= upper[node, 1]
+        inside = inside and lower[node, 2] <= z <= upper[node, 2]
+        if inside and node < leaves:
+            node = 2 * node
+            continue
+        for slot in range(LEAF * (node - leaves), LEAF * (node - leaves + 1) if inside else 0):
+            tri = order[slot]
+            if tri >= 0:
+                height = planes[tri, 0] * x + planes[tri, 1] * y + planes[tri, 2] * z + planes[tri, 3]
+                if abs(height) <= margin:
+                    return True
+        while node & 1:  # up to the next branch on the right
+            node >>= 1
+        node += node > 0
+    return False
+
+
+@lean
 def descend(lower, upper, node, x, y, z, ix, iy, iz, nearest, stack, depth):
     """Put those children of a node that a ray enters on the stack, the nearer one on top; its new depth."""
     left = enters(lower, upper, 2 * node, x, y, z, ix, iy, iz, nearest)

@@ -15,7 +15,7 @@ import numpy as np
 
 from fringetrace.core import jit, lean, part
 from fringetrace.tracing.intersect.coincident import BACK, sooner
-from fringetrace.tracing.intersect.exact import decide, enters, inset, inverse
+from fringetrace.tracing.intersect.exact import beside, decide, enters, inset, inverse
 
 # float32 resolves 2**-24 of the unit box; eight such steps separate a restart from its surface.
 SHIFT = 2.0**-20
@@ -23,6 +23,8 @@ SHIFT = 2.0**-20
 MARGIN = 8.0 * SHIFT
 # A ray leaving flatter than this (cosine to the normal) grazes.
 GRAZING = 0.125
+# Flatter to a face than this (cosine) a ray in float32 may cross its plane beside what `GROWN` adds to it.
+SLANTED = 2.0**-5
 # Flatter to a face than this (cosine) float32 knows the path to it to less than 2**-13 of the box.
 FLAT = 2.0**-10
 # Paths that agree to this part of them are the same, as far as roundings tell.
@@ -291,13 +293,26 @@ def preferred(rows, state, met, triangle, contact, normals, numbers, paths):
     return better
 
 
+@lean
+def overlooked(guess, facing, leaving, x, y, z, closed, radius, planes, tree):
+    """Whether float32 may have passed over a face of a body that a ray comes to, in its unit box.
+
+    The ray leaves a face of another body at the cosine `leaving`; 0: it is a source's.
+    """
+    if x * x + y * y + z * z > radius * radius:
+        return closed and guess >= 0 and facing > 0.0  # out of what it never went into
+    if leaving == 0.0 or abs(leaving) > SLANTED:
+        return False
+    return beside(planes, tree[1], tree[2], tree[3], x, y, z, MARGIN)
+
+
 @jit
 def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
     """Measure Embree's hits in float64; decide the doubtful ones exactly.
 
     Keeps a hit where it is nearer than the one in `met`. Returns how many were doubtful.
     """
-    first, stop, _, closed, frame, planes, _, crowd, _ = body
+    first, stop, _, closed, frame, planes, _, crowd, tree = body
     cx, cy, cz, scale = frame[0], frame[1], frame[2], frame[3]
     unscale, margin, many = 1.0 / scale, frame[5], len(crowd) > 0
     crossed, slack = contact[4], 2.0 * contact[2].max()
@@ -306,8 +321,6 @@ def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
         row = np.uintp(sent[i])
         guess = np.int64(prim[i])
         own = first <= last[row] < stop
-        if guess == -1 and not own:
-            continue
         dx, dy, dz = state[row, DX], state[row, DY], state[row, DZ]
         nx, ny, nz = state[row, NX], state[row, NY], state[row, NZ]
         x = (state[row, OX] - cx) * scale
@@ -321,7 +334,13 @@ def measure(sent, count, prim, state, last, came, contact, body, met, triangle):
         if guess >= 0:
             k = np.uintp(guess)
             facing, _, path, px, py, pz, rim = crossing(planes, k, x, y, z, dx, dy, dz)
-        doubt = unsure(guess, guess == left, path, facing, own, leaving, closed)
+        if own:
+            doubt = unsure(guess, guess == left, path, facing, own, leaving, closed)
+        else:
+            strange = overlooked(guess, facing, leaving, x, y, z, closed, frame[4], planes, tree)
+            if guess < 0 and not strange:
+                continue
+            doubt = strange or unsure(guess, guess == left, path, facing, own, leaving, closed)
         look = doubt or rim <= MARGIN or edge < margin
         if many and not look:
             look = (guess >= 0 and crowded(crowd, guess, px, py, pz)) or (
