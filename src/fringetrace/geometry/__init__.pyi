@@ -13,8 +13,8 @@ from .shapes import (
     rod_lattice as rod_lattice,
 )
 from .topology import (
-    Edges as Edges,
     IndexArray as IndexArray,
+    MeshEdges as MeshEdges,
     Topology as Topology,
     connected as connected,
     directed_edges as directed_edges,

@@ -93,7 +93,7 @@ class Topology:
         return Topology(*weld(vertices, faces))
 
     @cached_property
-    def edges(self) -> Edges:
+    def edges(self) -> MeshEdges:
         """Edges, each once."""
         ends = np.sort(directed_edges(self.faces), axis=1)
         key = ends[:, 1] * len(self.vertices) + ends[:, 0]
@@ -101,7 +101,7 @@ class Topology:
         first = np.flatnonzero(np.diff(key[order], prepend=-1))
         count = np.diff(first, append=len(key))
         rows = order[np.stack([first, first + np.minimum(count, 2) - 1], axis=1)]
-        return Edges(ends[rows[:, 0]], rows, count)
+        return MeshEdges(ends[rows[:, 0]], rows, count)
 
     @cached_property
     def fans(self) -> tuple[IndexArray, IndexArray]:
@@ -111,7 +111,7 @@ class Topology:
 
 
 @dataclass(frozen=True, eq=False)
-class Edges:
+class MeshEdges:
     """Edges of a mesh and the faces beside them.
 
     Attributes

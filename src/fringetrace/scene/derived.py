@@ -6,13 +6,7 @@ import inspect
 from collections.abc import Callable
 from functools import wraps
 from threading import RLock
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
-
-if TYPE_CHECKING:
-    from fringetrace.scene.model import Scene
-
-Result = TypeVar("Result")
-Options = ParamSpec("Options")
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar
 
 
 class Derived:
@@ -26,9 +20,21 @@ class Derived:
         return Derived, ()
 
 
+class _Keeper(Protocol):
+    """What keeps results: a scene."""
+
+    @property
+    def derived(self) -> Derived: ...
+
+
+Keeper = TypeVar("Keeper", bound=_Keeper)
+Options = ParamSpec("Options")
+Result = TypeVar("Result")
+
+
 def once_per_scene(
-    make: Callable[Concatenate[Scene, Options], Result],
-) -> Callable[Concatenate[Scene, Options], Result]:
+    make: Callable[Concatenate[Keeper, Options], Result],
+) -> Callable[Concatenate[Keeper, Options], Result]:
     """Decorate a function of a scene: the result is made once, whichever thread asks, and kept with it.
 
     Parameters
@@ -44,7 +50,7 @@ def once_per_scene(
     signature = inspect.signature(make)
 
     @wraps(make)
-    def kept(scene: Scene, /, *args: Options.args, **kwargs: Options.kwargs) -> Result:
+    def kept(scene: Keeper, /, *args: Options.args, **kwargs: Options.kwargs) -> Result:
         given = signature.bind(scene, *args, **kwargs)
         given.apply_defaults()
         key = (make, *given.args[1:])
