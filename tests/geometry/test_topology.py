@@ -43,7 +43,7 @@ def test_weld_joins_zeros_of_either_sign_but_not_neighbouring_numbers():
 
 def of_faces(faces):
     """Topology of faces whose vertices are all apart."""
-    return Topology.of(np.arange(30.0).reshape(10, 3), faces)
+    return Topology(np.arange(30.0).reshape(10, 3), faces)
 
 
 @settings(max_examples=40, deadline=None)

@@ -21,7 +21,7 @@ from fringetrace.core import (
     unit,
     value_text,
 )
-from fringetrace.geometry.topology import Topology
+from fringetrace.geometry.topology import Topology, weld
 
 # A face is degenerate when its height is below this part of its longest side: less than what
 # float64 coordinates can express, and far below any needle that still has a normal.
@@ -228,7 +228,7 @@ class Mesh:
     @cached_property
     def topology(self) -> Topology:
         """Welded vertices, edges and the faces beside them."""
-        return Topology.of(self.vertices, self.faces)
+        return Topology(*weld(self.vertices, self.faces))
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Mesh:
         """Mesh rotated about the origin, then shifted.

@@ -87,11 +87,6 @@ class Topology:
 
     __repr__ = short_repr
 
-    @staticmethod
-    def of(vertices: FloatArray, faces: IndexArray) -> Topology:
-        """Topology of vertices (v, 3) and faces (f, 3)."""
-        return Topology(*weld(vertices, faces))
-
     @cached_property
     def edges(self) -> MeshEdges:
         """Edges, each once."""

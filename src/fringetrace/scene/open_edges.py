@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fringetrace.core import FloatArray, short_repr
-from fringetrace.geometry import IndexArray, Mesh, Topology, connected, directed_edges
+from fringetrace.geometry import IndexArray, Mesh, Topology, connected, directed_edges, weld
 from fringetrace.scene.derived import once_per_scene
 from fringetrace.scene.model import Scene
 
@@ -70,7 +70,7 @@ def openings(scene: Scene) -> tuple[Opening, ...]:
     vertices = np.concatenate([mesh.vertices for mesh in meshes.values()])
     faces = np.concatenate([mesh.faces + start[i] for i, mesh in meshes.items()])
     owner = np.repeat(numbers, [len(mesh.faces) for mesh in meshes.values()])
-    whole = Topology.of(vertices, faces)
+    whole = Topology(*weld(vertices, faces))
     here = whole.edges.rows[whole.edges.count == 1, 0]
     edges = directed_edges(whole.faces)[here]
     hole = connected(edges)

@@ -68,8 +68,7 @@ def creases(scene: Scene) -> Creases:
     Creases
     """
     found = [_of(surface, part) for surface, part in zip(scene.surfaces, group_facets(scene), strict=True)]
-    columns = ([getattr(one, field.name) for one in found] for field in fields(Creases))
-    return Creases(*(np.concatenate(column) for column in columns))
+    return Creases(*(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Creases)))
 
 
 def _of(surface: Surface, part: npt.NDArray[np.int64]) -> Creases:
