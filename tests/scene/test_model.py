@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import fringetrace as ft
+from fringetrace import shapes
 from fringetrace.scene import sources
 from fringetrace.tracing.intersect.embree import build
 
@@ -198,3 +199,12 @@ def test_beams_and_ccds_travel():
         np.testing.assert_array_equal(other.centre, made.centre)
         assert other.shape == made.shape
     assert pickle.loads(pickle.dumps(beam(profile=ft.Gaussian(2.0)))).profile == ft.Gaussian(2.0)
+
+
+def test_a_surface_is_fitted_once_and_travels_without_the_fit():
+    ball = ft.Surface(shapes.icosphere(1.0, 1), ft.Mirror(), form=ft.forms.Sphere((0, 0, 0), 1.0))
+    assert ball.fit is ball.fit
+    other = pickle.loads(pickle.dumps(ball))
+    assert "fit" not in vars(other)
+    np.testing.assert_array_equal(other.fit.along, ball.fit.along)
+    assert ft.Surface(square(), ft.Mirror()).fit is None
