@@ -88,9 +88,7 @@ def altered(scene: ft.Scene, change: Callable) -> ft.Scene:
     other = ft.Scene(scene.surfaces)
     engine = build(other)
     bodies = tuple(change(body) for body in engine.bodies)
-    for name, kept in other.derived.items():
-        if kept is engine:
-            other.derived[name] = replace(engine, bodies=bodies)
+    object.__setattr__(engine, "bodies", bodies)
     return other
 
 

@@ -18,7 +18,7 @@ def spots(mesh, count=3000):
 
 
 def above(mesh, face, point):
-    return standoff(mesh.vertices, mesh.faces, face, point)
+    return standoff(mesh, face, point)
 
 
 @pytest.mark.parametrize(("level", "off"), [(2, 2e-2), (3, 5e-3), (4, 1.2e-3)])

@@ -42,10 +42,10 @@ def test_gradient_and_bend_are_the_derivatives_of_the_level(name):
 def test_a_mesh_is_fitted_on_either_side():
     mesh = shapes.icosphere(2.0, 2)
     form = forms.Sphere((0, 0, 0), 2.0)
-    assert (form.fit(mesh.vertices, mesh.faces).along == 1).all()
-    assert (form.fit(mesh.vertices, mesh.faces[:, ::-1]).along == -1).all()
+    assert (form.fit(mesh).along == 1).all()
+    assert (form.fit(ft.Mesh(mesh.vertices, mesh.faces[:, ::-1])).along == -1).all()
     corners = mesh.vertices[mesh.faces]
-    assert form.fit(mesh.vertices, mesh.faces).sag >= 2.0 - np.linalg.norm(corners.mean(axis=1), axis=1).max()
+    assert form.fit(mesh).sag >= 2.0 - np.linalg.norm(corners.mean(axis=1), axis=1).max()
 
 
 @pytest.mark.parametrize("wrong", [forms.Sphere((0, 0, 0), 3.0), forms.Cylinder((0, 0, 9), (1, 0, 0), 2.0)])

@@ -202,6 +202,33 @@ def test_moved_refuses_what_is_no_motion():
         square().moved(turn=np.diag([1.0, 1.0, -1.0]))
 
 
+# Facets
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.integers(-40, 40))
+def test_normals_and_areas_are_those_of_each_facet(seed, power):
+    """Corners are whole numbers times a power of two: their cross product is exact in whole numbers."""
+    corners = np.random.default_rng(seed).integers(-1000, 1000, (4, 3, 3))
+    mesh = ft.Mesh(corners.reshape(-1, 3) * 2.0**power, np.arange(12).reshape(4, 3))
+    (x, y, z), (u, v, w) = (corners[:, k].T - corners[:, 0].T for k in (1, 2))
+    cross = np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
+    length = np.sqrt((cross**2).sum(axis=1))
+    np.testing.assert_allclose(mesh.areas, 0.5 * length * 4.0**power, rtol=ROUNDING)
+    np.testing.assert_allclose(mesh.normals, cross / length[:, None], rtol=0, atol=ROUNDING)
+    np.testing.assert_array_equal(mesh.corners, corners * 2.0**power)
+
+
+def test_normals_and_areas_are_kept_and_cannot_be_written():
+    mesh = square()
+    assert mesh.normals is mesh.normals
+    assert mesh.areas is mesh.areas
+    for kept in (mesh.normals, mesh.areas):
+        with pytest.raises(ValueError, match="read-only"):
+            kept[0] = 0.0
+    assert "normals" not in vars(pickle.loads(pickle.dumps(mesh)))
+
+
 # From other libraries
 
 

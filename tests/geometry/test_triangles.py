@@ -1,3 +1,5 @@
+"""Bare triangles: polygons cut into them, and heights above points."""
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings, strategies as st
@@ -27,34 +29,6 @@ def areas(polygon, faces):
 def shoelace(polygon):
     x, y = polygon.T
     return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    arrays(
-        np.float64,
-        st.tuples(st.integers(1, 8), st.just(3), st.just(3)),
-        elements=st.sampled_from([0.0, -0.0, 1.0, 2.0]),
-    )
-)
-def test_weld_keeps_every_corner_and_one_of_each_vertex(corners):
-    vertices, faces = triangles.weld(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    assert np.array_equal(vertices[faces], corners)
-    assert len(vertices) == len(np.unique(corners.reshape(-1, 3) + 0.0, axis=0))
-
-
-def test_weld_keeps_the_order_of_first_appearance():
-    points = np.array([[5.0, 0, 0], [1, 0, 0], [5, 0, 0], [3, 0, 0], [1, 0, 0]])
-    vertices, faces = triangles.weld(points, np.array([[4, 3, 2]]))
-    assert vertices[:, 0].tolist() == [5, 1, 3]
-    assert faces.tolist() == [[1, 2, 0]]
-
-
-def test_weld_joins_zeros_of_either_sign_but_not_neighbouring_numbers():
-    points = np.array([[0.0, 1, 0], [-0.0, 1, 0], [0, np.nextafter(1, 2), 0]])
-    vertices, faces = triangles.weld(points, np.array([[0, 1, 2]]))
-    assert len(vertices) == 2
-    assert faces.tolist() == [[0, 0, 1]]
 
 
 @settings(max_examples=40, deadline=None)

@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 import fringetrace as ft
+from fringetrace import shapes
 from fringetrace.scene import sources
+from fringetrace.tracing.intersect.embree import build
 
 CORNERS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
 FACES = np.array([[0, 1, 2], [2, 1, 3]])
@@ -180,15 +182,15 @@ def test_names_of_surfaces_are_found_once():
 
 def test_a_scene_travels_without_what_was_derived_from_it():
     made = ft.Scene([ft.Surface(square(), ft.BeamSplitter(), name="splitter")])
-    made.derived["engine"] = lambda: None  # as little to be pickled as an Embree scene
+    engine = build(made, frozenset())  # an Embree scene cannot be pickled
     for other in (pickle.loads(pickle.dumps(made)), copy.deepcopy(made)):
-        assert other.derived == {}
+        assert build(other, frozenset()) is not engine
         assert other.index("splitter") == 0
         np.testing.assert_array_equal(other.surfaces[0].mesh.vertices, CORNERS)
         assert other.surfaces[0].interface == ft.BeamSplitter()
         with pytest.raises(ValueError, match="read-only"):
             other.surfaces[0].mesh.vertices[0, 0] = 1.0
-    assert "engine" in made.derived
+    assert build(made) is engine
 
 
 def test_beams_and_ccds_travel():
@@ -197,3 +199,12 @@ def test_beams_and_ccds_travel():
         np.testing.assert_array_equal(other.centre, made.centre)
         assert other.shape == made.shape
     assert pickle.loads(pickle.dumps(beam(profile=ft.Gaussian(2.0)))).profile == ft.Gaussian(2.0)
+
+
+def test_a_surface_is_fitted_once_and_travels_without_the_fit():
+    ball = ft.Surface(shapes.icosphere(1.0, 1), ft.Mirror(), form=ft.forms.Sphere((0, 0, 0), 1.0))
+    assert ball.fit is ball.fit
+    other = pickle.loads(pickle.dumps(ball))
+    assert "fit" not in vars(other)
+    np.testing.assert_array_equal(other.fit.along, ball.fit.along)
+    assert ft.Surface(square(), ft.Mirror()).fit is None

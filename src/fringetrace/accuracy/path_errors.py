@@ -52,10 +52,8 @@ def flattening(hits: SurfaceHits) -> tuple[FloatArray, FloatArray]:
     plain = ~hits.formed
     if plain.any():
         mesh, face = hits.surface.mesh, hits.face[plain]
-        corner = mesh.vertices[mesh.faces[face]]
-        normal = unit(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
-        above, lean[plain] = standoff(mesh.vertices, mesh.faces, face, hits.point[plain])
-        height[plain] = -above[:, None] * normal
+        above, lean[plain] = standoff(mesh, face, hits.point[plain])
+        height[plain] = -above[:, None] * mesh.normals[face]
     return height, lean
 
 

@@ -79,7 +79,7 @@ def facet_tables(scene: Scene) -> kernels.Facets:
         box, first = box + 2 * leaves, first + LEAF * leaves
     corners, owner, boxes = np.full((first, 9), np.nan), np.full(first, -1, np.int32), np.zeros((box, 6))
     for number, (surface, (box, leaves, first)) in enumerate(zip(scene.surfaces, roots, strict=True)):
-        table = surface.mesh.vertices[surface.mesh.faces]
+        table = surface.mesh.corners
         order = arrange(np.ascontiguousarray(table.mean(axis=1).T), leaves)
         corners[first : first + len(table)] = table.reshape(-1, 9)[order]
         owner[first : first + len(table)] = number

@@ -12,5 +12,13 @@ from .shapes import (
     plate as plate,
     rod_lattice as rod_lattice,
 )
-from .triangles import IndexArray as IndexArray, breadth as breadth, weld as weld
+from .topology import (
+    IndexArray as IndexArray,
+    MeshEdges as MeshEdges,
+    Topology as Topology,
+    connected as connected,
+    directed_edges as directed_edges,
+    weld as weld,
+)
+from .triangles import breadth as breadth
 from .zygo import write_height_map as write_height_map

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from fringetrace.core import FloatArray, dot, unit
-from fringetrace.geometry.triangles import IndexArray, weld
+from fringetrace.geometry.mesh import Mesh
+from fringetrace.geometry.topology import IndexArray
 
 # Facets whose normals are more than 30 degrees (cosine) apart meet in an edge of the part.
 SHARP = 0.8660254037844387
 
 
-def standoff(
-    vertices: FloatArray, faces: IndexArray, chosen: IndexArray, points: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+def standoff(mesh: Mesh, chosen: IndexArray, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Sag and slope error of facets at points on them, against the smooth surface behind them.
 
     Along each side of a facet the surface bends as the normals at its two ends say; each is the
@@ -24,8 +23,7 @@ def standoff(
 
     Parameters
     ----------
-    vertices : (v, 3) float64, metres
-    faces : (f, 3) int64
+    mesh : Mesh
     chosen : (n,) int64
         The facet of each point.
     points : (n, 3) float64, metres
@@ -38,11 +36,8 @@ def standoff(
         Its gradient along the facet: the normal of the surface less that of the facet is -lean.
     """
     used, place = np.unique(chosen, return_inverse=True)
-    vertices, faces, used = _around(vertices, faces, used)
-    corners = vertices[faces[used]]
-    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    lean = _corner_normals(vertices, faces, used) - normal[:, None]
-    corners, normal, lean = corners[place], normal[place], lean[place]
+    lean = (_corner_normals(mesh, used) - mesh.normals[used, None])[place]
+    corners, normal = mesh.vertices[mesh.faces[chosen]], mesh.normals[chosen]
     weight, rise = _barycentric(corners, normal, points)
     height, slope = np.zeros(len(points)), np.zeros_like(points)
     for i, j in ((0, 1), (1, 2), (2, 0)):
@@ -54,28 +49,11 @@ def standoff(
     return height, slope
 
 
-def _around(
-    vertices: FloatArray, faces: IndexArray, used: IndexArray
-) -> tuple[FloatArray, IndexArray, IndexArray]:
-    """The mesh about some of its faces, welded; and which faces those are in it."""
-    # files may give each facet vertices of its own: what is one vertex is told by its place
-    at = np.zeros(len(vertices), dtype=np.bool_)
-    at[faces[used]] = True
-    low, high = vertices[at].min(axis=0), vertices[at].max(axis=0)
-    within = ((vertices >= low) & (vertices <= high)).all(axis=1)
-    near = np.flatnonzero(within[faces].any(axis=1))
-    kept, compact = np.unique(faces[near], return_inverse=True)
-    welded, some = weld(vertices[kept], compact.reshape(-1, 3).astype(np.int64))
-    return welded, some, np.searchsorted(near, used)
-
-
-def _corner_normals(vertices: FloatArray, faces: IndexArray, used: IndexArray) -> FloatArray:
+def _corner_normals(mesh: Mesh, used: IndexArray) -> FloatArray:
     """Normals (n, 3, 3) at the corners of some faces, over the facets that go on smoothly from each."""
-    corners = vertices[faces]
-    normal = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    order = np.argsort(faces.ravel(), kind="stable")
-    ends = np.searchsorted(faces.ravel()[order], np.arange(len(vertices) + 1))
-    mine = faces[used].ravel()
+    # files may give each facet vertices of its own: what is one vertex is told by its place
+    normal, (order, ends) = mesh.normals, mesh.topology.fans
+    mine = mesh.topology.faces[used].ravel()
     count = ends[mine + 1] - ends[mine]
     owner = np.repeat(np.arange(len(mine)), count)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
@@ -83,8 +61,8 @@ def _corner_normals(vertices: FloatArray, faces: IndexArray, used: IndexArray) -
     goes_on = dot(normal[face], normal[used[owner // 3]]) > SHARP
     face, corner, owner = face[goes_on], corner[goes_on], owner[goes_on]
     # exact on a sphere: N. Max, J. Graphics Tools 4 (1999) 1
-    here = corners[face, corner]
-    one, other = corners[face, corner - 2] - here, corners[face, corner - 1] - here
+    here, one, other = (mesh.vertices[mesh.faces[face, corner - k]] for k in (0, 2, 1))
+    one, other = one - here, other - here
     share = np.cross(one, other) / (dot(one, one) * dot(other, other))[:, None]
     columns = [np.bincount(owner, share[:, axis], len(mine)) for axis in range(3)]
     total = np.stack(columns, axis=1).astype(np.float64)

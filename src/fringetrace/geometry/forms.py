@@ -26,6 +26,7 @@ from fringetrace.core import (
     unit,
 )
 from fringetrace.geometry.implicit import EPSILON, Fit, fit_level
+from fringetrace.geometry.mesh import Mesh
 from fringetrace.geometry.pn_triangles import patched, vertex_normals
 
 # Past its equator by no more than this, in radii squared, a conic is at it.
@@ -35,8 +36,8 @@ EQUATOR = 4.0 * EPSILON
 class Form(Protocol):
     """Protocol of exact surfaces that can be fitted to a mesh."""
 
-    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
-        """Fit of the form to a mesh, (v, 3) metres and (f, 3)."""
+    def fit(self, mesh: Mesh) -> Fit:
+        """Fit of the form to a mesh."""
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
         """The form rotated about the origin, then shifted; as `Mesh.moved`."""
@@ -82,9 +83,9 @@ class Sphere:
         value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
         return value, spoke, np.full(len(point), 1.0 / self.radius)
 
-    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+    def fit(self, mesh: Mesh) -> Fit:
         """Fit of the sphere to a mesh; see `Form`."""
-        return fit_level(self, vertices, faces, complete=True)
+        return fit_level(self, mesh, complete=True)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Sphere:
         """The sphere rotated about the origin, then shifted; as `Mesh.moved`."""
@@ -126,9 +127,9 @@ class Cylinder:
         value = 0.5 * self.radius * (dot(spoke, spoke) - 1.0)
         return value, spoke, (1.0 - component(direction, self.axis) ** 2) / self.radius
 
-    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+    def fit(self, mesh: Mesh) -> Fit:
         """Fit of the cylinder to a mesh; see `Form`."""
-        return fit_level(self, vertices, faces, complete=True)
+        return fit_level(self, mesh, complete=True)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Cylinder:
         """The cylinder rotated about the origin, then shifted; as `Mesh.moved`."""
@@ -222,9 +223,9 @@ class Conic:
         bend = -2.0 * first * dot(aside, aside) - 4.0 * second * dot(across, aside) ** 2
         return z - self.sag(square), self.axis - 2.0 * first[:, None] * across, bend
 
-    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+    def fit(self, mesh: Mesh) -> Fit:
         """Fit of the conic to a mesh; see `Form`."""
-        return fit_level(self, vertices, faces, complete=not self.terms)
+        return fit_level(self, mesh, complete=not self.terms)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Conic:
         """The conic rotated about the origin, then shifted; as `Mesh.moved`."""
@@ -296,9 +297,9 @@ class HeightField:
         bend = -(height[2, 0] * dx * dx + 2.0 * height[1, 1] * dx * dy + height[0, 2] * dy * dy)
         return z - height[0, 0], gradient, bend
 
-    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+    def fit(self, mesh: Mesh) -> Fit:
         """Fit of the spline to a mesh; see `Form`."""
-        return fit_level(self, vertices, faces, complete=False)
+        return fit_level(self, mesh, complete=False)
 
     def moved(
         self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None
@@ -350,14 +351,14 @@ class Smooth:
         normals[rough] = unit(normals[rough])
         object.__setattr__(self, "normals", normals)
 
-    def fit(self, vertices: FloatArray, faces: npt.NDArray[np.int64]) -> Fit:
+    def fit(self, mesh: Mesh) -> Fit:
         """Curved patches fitted to a mesh; see `Form`."""
-        normals = vertex_normals(vertices, faces) if self.normals is None else self.normals
-        if len(normals) != len(vertices):
+        normals = vertex_normals(mesh.vertices, mesh.faces) if self.normals is None else self.normals
+        if len(normals) != len(mesh.vertices):
             raise ValueError(
-                f"Smooth normals: expected {len(vertices)}, one for each vertex, got {len(normals)}"
+                f"Smooth normals: expected {len(mesh.vertices)}, one for each vertex, got {len(normals)}"
             )
-        return patched(vertices, faces, normals)
+        return patched(mesh, normals)
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Form:
         """The normals rotated; as `Mesh.moved`."""

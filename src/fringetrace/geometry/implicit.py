@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, dot, short_repr, unit
+from fringetrace.core import Array, FloatArray, dot, short_repr
+from fringetrace.geometry.mesh import Mesh
 
 EPSILON = float(np.finfo(np.float64).eps)
 # Vertices this part of the mesh's size off the form are not meant to lie on it.
@@ -136,14 +137,13 @@ class LevelFit:
             return Meeting(path, point, gradient / np.sqrt(square)[:, None], np.asarray(face))
 
 
-def fit_level(form: Level, vertices: FloatArray, faces: npt.NDArray[np.int64], complete: bool) -> LevelFit:
+def fit_level(form: Level, mesh: Mesh, complete: bool) -> LevelFit:
     """Fit of a form to a mesh: which faces lie on the form.
 
     Parameters
     ----------
     form : Level
-    vertices : (v, 3) float64, metres
-    faces : (f, 3) int64
+    mesh : Mesh
     complete : bool
         Whether the level is a quadratic function.
 
@@ -156,14 +156,10 @@ def fit_level(form: Level, vertices: FloatArray, faces: npt.NDArray[np.int64], c
     ValueError
         If none does.
     """
-    corners = vertices[faces]
-    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    doubled = np.linalg.norm(normal, axis=1)
-    normal = unit(normal)
+    corners, size, normal = mesh.corners, float(np.ptp(mesh.bounds, axis=0).max()), mesh.normals
     samples = [corners[:, 0], corners[:, 1], corners[:, 2], corners.mean(axis=1)]
     samples += [0.5 * (corners[:, k] + corners[:, k - 1]) for k in range(3)]
-    off, cosine = [], np.zeros(len(faces))
+    off, cosine = [], np.zeros(len(corners))
     with np.errstate(all="ignore"):
         for k, sample in enumerate(samples):
             value, gradient, _ = form.level(sample, normal)
@@ -173,10 +169,10 @@ def fit_level(form: Level, vertices: FloatArray, faces: npt.NDArray[np.int64], c
                 cosine = dot(normal, gradient) / steep
         on = (np.max(off[:3], axis=0) <= NEAR * size) & (np.abs(cosine) >= ALONG)
     along = np.where(on, np.sign(cosine), 0.0).astype(np.int8)
-    along[along == -np.sign((doubled * along).sum())] = 0  # the other side of a lens, not of this form
+    along[along == -np.sign((mesh.areas * along).sum())] = 0  # the other side of a lens, not of this form
     if not along.any():
         raise ValueError(
             f"{type(form).__name__} form: expected faces that lie along it within {NEAR:g} of the mesh's "
-            f"size, got none among {len(faces)}"
+            f"size, got none among {len(corners)}"
         )
     return LevelFit(form, along, float(np.max(np.stack(off)[:, along != 0])), complete, size)

@@ -18,8 +18,10 @@ from fringetrace.core import (
     filled,
     length_text,
     short_repr,
+    unit,
     value_text,
 )
+from fringetrace.geometry.topology import Topology, weld
 
 # A face is degenerate when its height is below this part of its longest side: less than what
 # float64 coordinates can express, and far below any needle that still has a normal.
@@ -78,25 +80,23 @@ def _checked_faces(value: Any, count: int, name: str) -> npt.NDArray[np.int64]:
     return np.array(raw, dtype=np.int64)
 
 
-def _checked_extent(corners: FloatArray, name: str) -> float:
-    """Longest side of the box around the corners, once it is known to be measurable."""
+def _checked_extent(corners: FloatArray, name: str) -> tuple[float, npt.NDArray[np.bool_]]:
+    """Longest side of the box around the corners, once known to be measurable; which faces have an area."""
     with np.errstate(over="ignore"):
         extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
     if not (extent < LARGEST and (extent == 0.0 or extent > SMALLEST)):
         raise ValueError(f"{name}: expected a size from {SMALLEST:g} to {LARGEST:g} m, got {extent:g} m")
-    return extent
+    sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
+    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return extent, doubled > DEGENERATE * (sides**2).sum(axis=2).max(axis=1)
 
 
 def _check_shape(vertices: FloatArray, faces: npt.NDArray[np.int64], name: str) -> None:
     """Refuse faces without area, and meshes too far off for float64 to resolve."""
     corners = vertices[faces]
-    extent = _checked_extent(corners, name)
+    extent, spread = _checked_extent(corners, name)
     farthest = np.abs(corners).max()
-    sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
-    longest = np.sqrt((sides**2).sum(axis=2).max(axis=1))
-    doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    bad = np.flatnonzero(~(doubled > DEGENERATE * longest**2))
-    if len(bad):
+    if len(bad := np.flatnonzero(~spread)):
         raise ValueError(
             f"{name} faces: expected triangles with an area, got {len(bad)} of {len(faces)} "
             f"without (faces {_named(bad)}); drop them, or give Mesh.cleaned(...)"
@@ -192,17 +192,43 @@ class Mesh:
         """
         points = _checked_vertices(vertices, name)
         triangles = _checked_faces(faces, len(points), name)
-        corners = points[triangles]
-        extent = _checked_extent(corners, name)
-        sides = (corners - np.roll(corners, 1, axis=1)) / max(extent, SMALLEST)
-        doubled = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        return Mesh(points, triangles[doubled > DEGENERATE * (sides**2).sum(axis=2).max(axis=1)], name)
+        return Mesh(points, triangles[_checked_extent(points[triangles], name)[1]], name)
+
+    @property
+    def corners(self) -> FloatArray:
+        """Corners of the faces, (f, 3, 3) float64, metres."""
+        return self.vertices[self.faces]
 
     @cached_property
     def bounds(self) -> FloatArray:
         """Bounding box of the faces, (2, 3) float64, metres: lower and upper corner."""
-        corners = self.vertices[self.faces].reshape(-1, 3)
+        corners = self.corners.reshape(-1, 3)
         return np.array([corners.min(axis=0), corners.max(axis=0)])
+
+    @cached_property
+    def normals(self) -> FloatArray:
+        """Normals of the faces to the front, (f, 3) float64, unit."""
+        normals = unit(self._crossed)
+        normals.flags.writeable = False
+        return normals
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """Areas of the faces, (f,) float64, m^2."""
+        areas = 0.5 * np.linalg.norm(self._crossed, axis=1)
+        areas.flags.writeable = False
+        return np.asarray(areas)
+
+    @property
+    def _crossed(self) -> FloatArray:
+        """Cross products of two sides of each face, (f, 3) float64, m^2."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def topology(self) -> Topology:
+        """Welded vertices, edges and the faces beside them."""
+        return Topology(*weld(self.vertices, self.faces))
 
     def moved(self, offset: npt.ArrayLike = (0.0, 0.0, 0.0), turn: npt.ArrayLike | None = None) -> Mesh:
         """Mesh rotated about the origin, then shifted.

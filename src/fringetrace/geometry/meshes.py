@@ -30,7 +30,8 @@ from fringetrace.geometry.shapes import (
     staircase,
     step,
 )
-from fringetrace.geometry.triangles import IndexArray, height_above, weld
+from fringetrace.geometry.topology import IndexArray, weld
+from fringetrace.geometry.triangles import height_above
 from fringetrace.geometry.zygo import KINDS, existing_file, read_height_map, write_height_map
 
 if TYPE_CHECKING:
@@ -304,5 +305,5 @@ def interpolate_height(mesh: Mesh, x: npt.ArrayLike, y: npt.ArrayLike) -> FloatA
     mesh, height = as_mesh(mesh), np.full(points.shape[:-1], np.nan)
     somewhere = np.isfinite(points).all(axis=-1)
     if somewhere.any():
-        height[somewhere] = height_above(mesh.vertices[mesh.faces], points[somewhere])
+        height[somewhere] = height_above(mesh.corners, points[somewhere])
     return height

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray, dot, short_repr, unit
 from fringetrace.geometry.implicit import EPSILON, ROUNDINGS, STEPS, Meeting, advance
+from fringetrace.geometry.mesh import Mesh
 
 # Vertex normals may lean this far (cosine) from a face's: beyond, the mesh has an edge there.
 LEAN = 0.75
@@ -211,13 +212,12 @@ def _solved(du: FloatArray, dv: FloatArray, goal: FloatArray) -> tuple[FloatArra
     return p, (du[:, 0] * goal[:, 1] - du[:, 1] * goal[:, 0]) / area
 
 
-def patched(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatArray) -> Patches:
+def patched(mesh: Mesh, normals: FloatArray) -> Patches:
     """Fit curved patches to a mesh.
 
     Parameters
     ----------
-    vertices : (v, 3) float64, metres
-    faces : (f, 3) int64
+    mesh : Mesh
     normals : (v, 3) float64, unit
 
     Returns
@@ -229,9 +229,7 @@ def patched(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatAr
     ValueError
         If faces are not wound alike, or lean too far from the normals.
     """
-    corners = vertices[faces]
-    sides = [corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]]
-    upright = unit(np.cross(sides[0], sides[1]))
+    faces, corners, upright = mesh.faces, mesh.corners, mesh.normals
     cosine = np.einsum("ni,nki->nk", upright, normals[faces]).min(axis=1)
     if not (cosine > LEAN).all():
         raise ValueError(
@@ -240,14 +238,14 @@ def patched(vertices: FloatArray, faces: npt.NDArray[np.int64], normals: FloatAr
             "either side of a sharp edge a surface of its own"
         )
     centre = corners.mean(axis=1)
-    first = unit(sides[0])
+    first = unit(corners[:, 1] - corners[:, 0])
     frame = np.stack([first, np.cross(upright, first), upright], axis=1)
     local = np.einsum("nij,nkj->nki", frame[:, :2], corners - centre[:, None])
     # parameters are 1 at their own corner, 0 at the two others
     system = np.concatenate([local, np.ones((len(faces), 3, 1))], axis=2)
     flat = np.swapaxes(np.linalg.inv(system), 1, 2)[:, :2]
-    control = _control(vertices, faces, normals) - centre[:, None]
-    size = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    control = _control(mesh.vertices, faces, normals) - centre[:, None]
+    size = float(np.ptp(mesh.bounds, axis=0).max())
     # no patch is farther off than its control points
     sag = float(np.abs(np.einsum("nj,nkj->nk", upright, control)).max())
     along = np.ones(len(faces), dtype=np.int8)

@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from fringetrace.core import FloatArray, checked_length, filled, unit
 from fringetrace.geometry.mesh import Mesh
-from fringetrace.geometry.triangles import IndexArray, doubled_area, self_crossing, triangulate, weld
+from fringetrace.geometry.topology import IndexArray, weld
+from fringetrace.geometry.triangles import doubled_area, self_crossing, triangulate
 
 _G = 0.5 + math.sqrt(1.25)  # golden ratio
 # fmt: off

@@ -1,16 +1,14 @@
-"""Geometry of bare triangles: vertex welding, polygon triangulation, height above a point."""
+"""Geometry of bare triangles: polygon triangulation, height above a point."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
 from fringetrace.core import FloatArray
 from fringetrace.geometry.mesh import Mesh
-
-IndexArray = npt.NDArray[np.int64]
+from fringetrace.geometry.topology import IndexArray, connected
 
 # A point may stand this part of a triangle outside it, for the rounding of its coordinates.
 EDGE = 1e-9
@@ -18,33 +16,6 @@ EDGE = 1e-9
 WALL = 1e-12
 # Pairs of point and triangle that are compared at a time; bounds the memory.
 PAIRS = 1 << 17
-
-
-def weld(vertices: FloatArray, faces: IndexArray) -> tuple[FloatArray, IndexArray]:
-    """Weld vertices with exactly equal coordinates.
-
-    Parameters
-    ----------
-    vertices : (v, 3) float64
-    faces : (f, 3) int64
-
-    Returns
-    -------
-    vertices : (w, 3) float64
-        In the order in which they first appeared.
-    faces : (f, 3) int64
-        The same faces in the same order.
-    """
-    order = np.lexsort(vertices.T)
-    opens = np.ones(len(vertices), dtype=bool)
-    opens[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
-    first = order[opens]  # the sort is stable: the earliest of each group
-    appearance = np.argsort(first)
-    rank = np.empty_like(appearance)
-    rank[appearance] = np.arange(len(first))
-    welded = np.empty(len(vertices), dtype=np.int64)
-    welded[order] = rank[np.cumsum(opens) - 1]
-    return vertices[first[appearance]], welded[faces]
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -227,14 +198,9 @@ def breadth(mesh: Mesh) -> float:
 
     Of rods their diameter; of plates and reliefs, however shallow, a side.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(mesh.vertices)
-    ends = mesh.faces.ravel(), np.roll(mesh.faces, 1, axis=1).ravel()
-    part = connected_components(coo_matrix((np.ones(len(ends[0])), ends), (count, count)), directed=False)[1]
+    part = connected(mesh.topology.faces)
     order = np.argsort(part, kind="stable")
-    first = np.flatnonzero(np.diff(part[order], prepend=-1))
-    reach = (f.reduceat(mesh.vertices[order], first) for f in (np.maximum, np.minimum))
-    second = np.sort(np.subtract(*reach), axis=1)[:, 1]
+    first, corners = np.flatnonzero(np.diff(part[order], prepend=-1)), mesh.corners[order]
+    lower = np.minimum.reduceat(corners.min(axis=1), first)
+    second = np.sort(np.maximum.reduceat(corners.max(axis=1), first) - lower, axis=1)[:, 1]
     return float(second[second > 0.0].min())

@@ -181,7 +181,7 @@ def _box(half: float, thickness: float) -> tuple[Mesh, Mesh, Mesh]:
     """Upper face, lower face and rim of a plate whose upper face goes through the origin at 45 degrees."""
     face = plate(2.0 * half * math.sqrt(2.0), 2.0 * half)
     box = plate(2.0 * half * math.sqrt(2.0), 2.0 * half, thickness)
-    level = np.ptp(box.vertices[box.faces][:, :, 2], axis=1) == 0.0
+    level = np.ptp(box.corners[:, :, 2], axis=1) == 0.0
     lower, rim = face.moved((0.0, 0.0, -thickness)), Mesh(box.vertices, box.faces[~level], "rim")
     upper, lower, rim = (mesh.moved(turn=_turn()) for mesh in (face, lower, rim))
     return upper, lower, rim

@@ -1,4 +1,5 @@
 from .coplanar import planes as planes
+from .derived import once_per_scene as once_per_scene
 from .facet_groups import group_facets as group_facets
 from .model import Scene as Scene, Surface as Surface
 from .open_edges import Opening as Opening, openings as openings

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy.typing as npt
@@ -11,9 +12,10 @@ import numpy.typing as npt
 from fringetrace.core import described, value_text
 from fringetrace.geometry import Mesh, as_mesh
 from fringetrace.optics import Dielectric, Interface, InterfaceKind, Metal
+from fringetrace.scene.derived import Derived
 
 if TYPE_CHECKING:
-    from fringetrace.geometry import Form
+    from fringetrace.geometry import Fit, Form
     from fringetrace.optics import Element, Film, Material
 
 
@@ -77,7 +79,15 @@ class Surface:
         if self.form is not None:
             if isinstance(self.form, type) or not hasattr(self.form, "fit"):
                 raise TypeError(f"{self.name} form: expected one such as forms.Sphere, got {self.form!r}")
-            self.form.fit(self.mesh.vertices, self.mesh.faces)  # refuses what is not meant for this mesh
+            _ = self.fit  # refuses what is not meant for this mesh
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {one.name: getattr(self, one.name) for one in fields(self)}
+
+    @cached_property
+    def fit(self) -> Fit | None:
+        """Fit of the form to the mesh, or None."""
+        return None if self.form is None else self.form.fit(self.mesh)
 
     @property
     def boundary(self) -> bool:
@@ -146,8 +156,8 @@ class Scene:
 
     surfaces: tuple[Surface, ...]
     medium: Material | None = None
-    # what rooms above have derived from the surfaces (the engine's bodies), kept with them
-    derived: dict[str, Any] = field(default_factory=dict, init=False, repr=False)
+    # see `once_per_scene`
+    derived: Derived = field(default_factory=Derived, init=False, repr=False)
 
     def __repr__(self) -> str:
         named = [f"{s.name} ({type(s.interface).__name__})" for s in self.surfaces[:NAMED_SURFACES]]
@@ -165,9 +175,6 @@ class Scene:
             raise ValueError("Scene: expected at least one Surface, got none")
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "medium", _medium(self.medium, "Scene medium"))
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "derived": {}}
 
     @property
     def around(self) -> Material:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from fringetrace.core import Array, FloatArray, short_repr
-from fringetrace.geometry import IndexArray, Mesh, weld
+from fringetrace.core import FloatArray, short_repr
+from fringetrace.geometry import IndexArray, Mesh, Topology, connected, directed_edges, weld
+from fringetrace.scene.derived import once_per_scene
 from fringetrace.scene.model import Scene
 
 # A mesh is meant to close if its vector area is a smaller part of its area than this: of a closed mesh it
@@ -44,6 +44,7 @@ class Opening:
     __repr__ = short_repr
 
 
+@once_per_scene
 def openings(scene: Scene) -> tuple[Opening, ...]:
     """Holes in boundaries that are closed but for them, largest first; found once and kept with the scene.
 
@@ -58,13 +59,6 @@ def openings(scene: Scene) -> tuple[Opening, ...]:
     -------
     tuple of Opening
     """
-    if "openings" not in scene.derived:
-        scene.derived["openings"] = _openings(scene)
-    found: tuple[Opening, ...] = scene.derived["openings"]
-    return found
-
-
-def _openings(scene: Scene) -> tuple[Opening, ...]:
     numbers = [i for i, surface in enumerate(scene.surfaces) if surface.boundary]
     meshes = {i: scene.surfaces[i].mesh for i in numbers}
     suspected = [i for i in numbers if not (_closed(meshes[i].faces) or _sheet(meshes[i]))]
@@ -76,23 +70,19 @@ def _openings(scene: Scene) -> tuple[Opening, ...]:
     vertices = np.concatenate([mesh.vertices for mesh in meshes.values()])
     faces = np.concatenate([mesh.faces + start[i] for i, mesh in meshes.items()])
     owner = np.repeat(numbers, [len(mesh.faces) for mesh in meshes.values()])
-    points, welded = weld(vertices, faces)
-    edges, here = _open_edges(welded)
-    hole = _loops(edges)
+    whole = Topology(*weld(vertices, faces))
+    here = whole.edges.rows[whole.edges.count == 1, 0]
+    edges = directed_edges(whole.faces)[here]
+    hole = connected(edges)
     found = []
     for number in range(int(hole.max(initial=-1)) + 1):
         mine = np.flatnonzero(hole == number)
         surface = int(owner[here[mine[0]] // 3])
-        area, centre, seam = _measured(points[edges[mine]])
+        area, centre, seam = _measured(whole.vertices[edges[mine]])
         if surface in suspected and not seam:
             mine = mine[owner[here[mine] // 3] == surface]
-            found.append(Opening(surface, _sides(faces)[here[mine]] - start[surface], area, centre))
+            found.append(Opening(surface, directed_edges(faces)[here[mine]] - start[surface], area, centre))
     return tuple(sorted(found, key=lambda opening: -opening.area))
-
-
-def _sides(faces: IndexArray) -> IndexArray:
-    """Directed edges of faces, (3 f, 2)."""
-    return np.stack([faces, np.roll(faces, -1, axis=1)], axis=-1).reshape(-1, 2)
 
 
 def _closed(faces: IndexArray) -> bool:
@@ -108,34 +98,10 @@ def _closed(faces: IndexArray) -> bool:
 
 def _sheet(mesh: Mesh) -> bool:
     """Whether a mesh is not meant to close: it is flat, a bowl, or a prism without ends."""
-    corners = mesh.vertices[mesh.faces]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas /= np.abs(areas).max()
+    areas = mesh.normals * (mesh.areas / mesh.areas.max())[:, None]
     along, *_, most = np.linalg.eigvalsh(areas.T @ areas)
     total = np.linalg.norm(areas, axis=1).sum()
     return bool(along < PRISM**2 * most or np.linalg.norm(areas.sum(axis=0)) > SHEET * total)
-
-
-def _open_edges(faces: IndexArray) -> tuple[IndexArray, npt.NDArray[np.int64]]:
-    """Edges that only one face has, (k, 2), and their rows among `_sides`."""
-    sides = _sides(faces)
-    low, high = sides.min(axis=1), sides.max(axis=1)
-    _, first, count = np.unique(low * (faces.max() + 1) + high, return_index=True, return_counts=True)
-    rows = first[count == 1]
-    return sides[rows], rows
-
-
-def _loops(edges: IndexArray) -> Array:
-    """The connected part that each edge belongs to, from 0 on."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    if len(edges) == 0:
-        return np.empty(0, dtype=np.int64)
-    vertex, ends = np.unique(edges, return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (len(vertex), len(vertex)))
-    return np.asarray(connected_components(graph, directed=False)[1][ends[:, 0]], dtype=np.int64)
 
 
 def _measured(ends: FloatArray) -> tuple[float, FloatArray, bool]:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray, dot, short_repr, unit
-from fringetrace.geometry import Fit, LevelFit, Patches
+from fringetrace.geometry import LevelFit, Patches
 from fringetrace.scene import Surface
 from fringetrace.tracing.optics_table import constants
 from fringetrace.tracing.paths import Paths
@@ -177,8 +177,6 @@ class SurfaceHits:
     Attributes
     ----------
     surface : Surface
-    fit : Fit or None
-        Of its form to its mesh.
     path, hit : (n,) int64
         Which path, and which of its hits.
     point : (n, 3) float64, metres
@@ -187,7 +185,6 @@ class SurfaceHits:
     """
 
     surface: Surface
-    fit: Fit | None
     path: npt.NDArray[np.int64]
     hit: npt.NDArray[np.int64]
     point: FloatArray
@@ -198,9 +195,9 @@ class SurfaceHits:
     @property
     def formed(self) -> npt.NDArray[np.bool_]:
         """Whether each hit is on a facet with an exact form, (n,) bool."""
-        if self.fit is None:
+        if self.surface.fit is None:
             return np.zeros(len(self.face), dtype=np.bool_)
-        return np.asarray(self.fit.along[self.face] != 0)
+        return np.asarray(self.surface.fit.along[self.face] != 0)
 
     @cached_property
     def corners(self) -> FloatArray:
@@ -243,11 +240,11 @@ class SurfaceHits:
         second : (k,) float64, 1/m
             Second derivative along `direction`.
         """
-        point = self.point[rows]
-        if isinstance(self.fit, LevelFit):
-            return self.fit.form.level(point, direction)
-        assert isinstance(self.fit, Patches)
-        return self.fit.level(point, direction, self.face[rows])[:3]
+        point, fit = self.point[rows], self.surface.fit
+        if isinstance(fit, LevelFit):
+            return fit.form.level(point, direction)
+        assert isinstance(fit, Patches)
+        return fit.level(point, direction, self.face[rows])[:3]
 
 
 def surface_hits(paths: Paths) -> Iterator[SurfaceHits]:
@@ -274,8 +271,5 @@ def surface_hits(paths: Paths) -> Iterator[SurfaceHits]:
     for number, surface in enumerate(paths.scene.surfaces):
         path, hit = np.nonzero(paths.surface == number)
         if len(path):
-            fit = (
-                None if surface.form is None else surface.form.fit(surface.mesh.vertices, surface.mesh.faces)
-            )
             point = paths.points[path, hit + 1]
-            yield SurfaceHits(surface, fit, path, hit, point, paths.triangle[path, hit])
+            yield SurfaceHits(surface, path, hit, point, paths.triangle[path, hit])

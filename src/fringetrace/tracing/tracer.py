@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from numbers import Real
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,10 +25,6 @@ from fringetrace.tracing.plan import Plan, TraceLimits
 from fringetrace.tracing.rays import Rays
 from fringetrace.tracing.record import tables
 from fringetrace.tracing.workspace import Workspace
-
-if TYPE_CHECKING:
-    from fringetrace.tracing.intersect.embree import Engine
-    from fringetrace.tracing.intersect.on_forms import Formed
 
 Progress = Callable[[int, int], None]
 Result = TypeVar("Result")
@@ -64,14 +60,6 @@ class Options:
         return self.chunk or (CHUNK // 4 if splits else CHUNK)
 
 
-def _forms(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
-    if all(surface.form is None for surface in scene.surfaces):
-        return ()
-    from fringetrace.tracing.intersect.on_forms import formed
-
-    return formed(scene, engine)
-
-
 def _plan(
     scene: Scene, source: Beam | Rays, ccd: CCD | None, options: Options, warned: set[str] | None
 ) -> Plan:
@@ -82,6 +70,7 @@ def _plan(
     if ccd is not None and not isinstance(ccd, CCD):
         raise TypeError(f"trace: expected a CCD or None, got {type(ccd).__name__}")
     from fringetrace.tracing.intersect.embree import build
+    from fringetrace.tracing.intersect.on_forms import formed
     from fringetrace.tracing.optics_table import optics
 
     met = optics(scene, options.wavelength, source.polarisation is not None)
@@ -96,7 +85,7 @@ def _plan(
         faint=float(options.min_amplitude) ** 2,
         key_base=len(scene.digits) + 1,
     )
-    forms = _forms(scene, engine)
+    forms = formed(scene, engine)
     return Plan(scene, source, ccd, engine, forms, passed, met, limits, options.record, warned)
 
 

@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray, unit
 from fringetrace.field.wavefront.ray_tubes import along_grid
-from fringetrace.geometry import weld
-from fringetrace.scene import Scene, Surface, group_facets
+from fringetrace.scene import Scene, Surface, group_facets, once_per_scene
 from fringetrace.tracing import Fate, Paths
 
 # Rays go by an edge this many cells to either side of it and within its ends, so far apart along it.
@@ -41,7 +40,7 @@ class Creases:
     ----------
     ends : (n, 2, 3) float64, metres
     normals : (n, 2, 3) float64
-        Of the faces on either side of an edge of a form, not scaled, which is a silhouette seen from
+        Of the faces on either side of an edge of a form, unit, which is a silhouette seen from
         where one shows its front and the other its back; NaN for rims and edges between facets.
     """
 
@@ -56,6 +55,7 @@ class Creases:
         return self.ends[~through]
 
 
+@once_per_scene
 def creases(scene: Scene) -> Creases:
     """Feature edges: rims, edges between facets of different planes, and all edges within forms.
 
@@ -67,31 +67,17 @@ def creases(scene: Scene) -> Creases:
     -------
     Creases
     """
-    if "creases" not in scene.derived:
-        found = [
-            _of(surface, part) for surface, part in zip(scene.surfaces, group_facets(scene), strict=True)
-        ]
-        columns = ([getattr(one, field.name) for one in found] for field in fields(Creases))
-        scene.derived["creases"] = Creases(*(np.concatenate(column) for column in columns))
-    kept: Creases = scene.derived["creases"]
-    return kept
+    found = [_of(surface, part) for surface, part in zip(scene.surfaces, group_facets(scene), strict=True)]
+    return Creases(*(np.concatenate([getattr(one, f.name) for one in found]) for f in fields(Creases)))
 
 
 def _of(surface: Surface, part: npt.NDArray[np.int64]) -> Creases:
-    vertices, faces = weld(surface.mesh.vertices, surface.mesh.faces)
-    side = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    face = np.tile(np.arange(len(faces)), 3)
-    order = np.lexsort(side.T)
-    side, face = side[order], face[order]
-    first = np.flatnonzero(np.append(True, (side[1:] != side[:-1]).any(axis=1)))
-    shared = np.diff(np.append(first, len(side)))
-    one, other = face[first], face[first + np.minimum(shared, 2) - 1]
-    joined = (shared == 2) & (part[one] == part[other])
-    a, b, c = np.moveaxis(vertices[faces], 1, 0)
-    normal = np.cross(b - a, c - a)
-    normals = np.where(joined[:, None, None], np.stack([normal[one], normal[other]], axis=1), np.nan)
+    mesh, edges = surface.mesh, surface.mesh.topology.edges
+    one, other = edges.rows.T // 3
+    joined = (edges.count == 2) & (part[one] == part[other])
+    normals = np.where(joined[:, None, None], mesh.normals[edges.rows // 3], np.nan)
     kept = ~joined | (part[one] < 0)
-    return Creases(vertices[side[first[kept]]], normals[kept])
+    return Creases(mesh.topology.vertices[edges.ends[kept]], normals[kept])
 
 
 @dataclass(frozen=True, eq=False)

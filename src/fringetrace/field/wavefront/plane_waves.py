@@ -72,11 +72,8 @@ def _met(paths: Paths, row: int) -> list[tuple[Surface, FloatArray]]:
     assert paths.triangle is not None
     count = paths.bounces[row]
     surfaces = [paths.scene.surfaces[number] for number in paths.surface[row, :count]]
-    corners = np.empty((count, 3, 3))
-    for k, (surface, face) in enumerate(zip(surfaces, paths.triangle[row, :count], strict=True)):
-        corners[k] = surface.mesh.vertices[surface.mesh.faces[face]]
-    normals = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
-    return list(zip(surfaces, normals, strict=True))
+    faces = paths.triangle[row, :count]
+    return [(surface, surface.mesh.normals[face]) for surface, face in zip(surfaces, faces, strict=True)]
 
 
 def _sent(paths: Paths, row: int, bounce: int, direction: FloatArray, normal: FloatArray) -> FloatArray:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
-from fringetrace.scene import Scene
+from fringetrace.scene import Scene, once_per_scene
 from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.intersect.bodies import Body, IntArray, group, unite
 from fringetrace.tracing.optics_table import sides
@@ -79,6 +79,7 @@ class Hits:
         )
 
 
+@once_per_scene
 def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
     """Build the intersection engine of a scene, once; it is kept with the scene.
 
@@ -92,23 +93,19 @@ def build(scene: Scene, alone: frozenset[int] = frozenset()) -> Engine:
     -------
     Engine
     """
-    name = f"engine {sorted(alone)}"
-    if name not in scene.derived:
-        bodies: list[Body] = []
-        offset = np.zeros(len(scene.surfaces), dtype=np.int64)
-        owner: list[Array] = []
-        first = 0
-        meshes = [surface.mesh for surface in scene.surfaces]
-        for members in group(meshes, alone):
-            body = unite(meshes, members, first)
-            for i in members:
-                offset[i] = first
-                first += len(meshes[i].faces)
-                owner.append(np.full(len(meshes[i].faces), i, dtype=np.int32))
-            bodies.append(body)
-        scene.derived[name] = Engine(tuple(bodies), np.concatenate(owner), offset, sides(scene))
-    engine: Engine = scene.derived[name]
-    return engine
+    bodies: list[Body] = []
+    offset = np.zeros(len(scene.surfaces), dtype=np.int64)
+    owner: list[Array] = []
+    first = 0
+    meshes = [surface.mesh for surface in scene.surfaces]
+    for members in group(meshes, alone):
+        body = unite(meshes, members, first)
+        for i in members:
+            offset[i] = first
+            first += len(meshes[i].faces)
+            owner.append(np.full(len(meshes[i].faces), i, dtype=np.int32))
+        bodies.append(body)
+    return Engine(tuple(bodies), np.concatenate(owner), offset, sides(scene))
 
 
 def aim(

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray, dot
 from fringetrace.geometry import Fit, LevelFit, Meeting
-from fringetrace.scene import Scene
+from fringetrace.scene import Scene, once_per_scene
 from fringetrace.tracing.batch import Batch
 from fringetrace.tracing.intersect.bodies import Body
 from fringetrace.tracing.intersect.coincident import BACK, COLUMNS, COUNT, FIRST
@@ -48,6 +48,7 @@ class Formed:
     side: float
 
 
+@once_per_scene
 def formed(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
     """Surfaces of a scene that have a form, fitted once and kept with the scene.
 
@@ -61,21 +62,15 @@ def formed(scene: Scene, engine: Engine) -> tuple[Formed, ...]:
     -------
     tuple of Formed
     """
-    name = f"forms {[body.surfaces for body in engine.bodies]}"
-    if name in scene.derived:
-        kept: tuple[Formed, ...] = scene.derived[name]
-        return kept
     found = []
     for i, surface in enumerate(scene.surfaces):
-        if surface.form is None:
+        if surface.fit is None:
             continue
         body = next(body for body in engine.bodies if body.surfaces == (i,))
         body.prepare()
-        corners = surface.mesh.vertices[surface.mesh.faces]
+        corners = surface.mesh.corners
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        fit = surface.form.fit(surface.mesh.vertices, surface.mesh.faces)
-        found.append(Formed(i, body, fit, float(sides.max())))
-    scene.derived[name] = tuple(found)
+        found.append(Formed(i, body, surface.fit, float(sides.max())))
     return tuple(found)
 
 
