@@ -7,7 +7,7 @@ import pytest
 
 import fringetrace as ft
 from fringetrace import mm, um
-from fringetrace.field.beam_kernels import DERIVATIVES, GRADIENT, PATH, S, T, X, Y
+from fringetrace.field.beam_tables import DERIVATIVES, GRADIENT, PATH, S, T, X, Y
 from fringetrace.field.beam_tracing import SLIVER, follow_beam
 from fringetrace.geometry import shapes
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fringetrace.field import beam_kernels, polygon_kernels
+from fringetrace.field import polygon_kernels, visibility_kernels
 from fringetrace.field.polygon_kernels import CORNERS, MANY
 
 # Rounding of a few hundred operations on numbers about 1.
@@ -81,6 +81,6 @@ def test_what_is_taken_from_polygons_and_what_is_left_add_up():
                 inside = pieces[k].copy()
                 n = polygon_kernels.clipped(inside, sizes[k, 0], lines, many, spare)
                 taken += polygon_kernels.area(inside, n) if n >= 3 else 0.0
-            count = beam_kernels.subtract(pieces, sizes, count, lines, many, 0.0, spare, rest)
+            count = visibility_kernels.subtract(pieces, sizes, count, lines, many, 0.0, spare, rest)
         left = sum(polygon_kernels.area(pieces[k], sizes[k, 0]) for k in range(count))
         assert left + taken == pytest.approx(whole, abs=ROUNDING)

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fringetrace.core import Array, FloatArray
-from fringetrace.field import beam_kernels as kernels
+from fringetrace.field import beam_kernels as kernels, beam_tables, visibility_kernels
 from fringetrace.scene import CCD, Beam, Scene, screen
 from fringetrace.tracing import LEAF, arrange, constants
 
@@ -33,7 +33,7 @@ class Footprints:
     first : (n + 1,) int64
         Where those of each begin.
     wave : (n, 13) float64
-        Columns as `beam_kernels` names them: a point in pixels, path there in metres, its gradient in metres
+        Columns as `beam_tables` names them: a point in pixels, path there in metres, its gradient in metres
         a pixel, complex amplitude, and where in the source the light comes from.
     key : (n,) uint64
         Path keys.
@@ -61,7 +61,7 @@ class Footprints:
         return self.corners.nbytes + self.first.nbytes + self.wave.nbytes + self.key.nbytes
 
 
-def facet_tables(scene: Scene) -> kernels.Facets:
+def facet_tables(scene: Scene) -> beam_tables.Facets:
     """Facets of a scene in the order of a tree of boxes over each surface, as the compiled loops take them.
 
     Parameters
@@ -70,7 +70,7 @@ def facet_tables(scene: Scene) -> kernels.Facets:
 
     Returns
     -------
-    beam_kernels.Facets
+    beam_tables.Facets
     """
     roots, box, first = [], 0, 0
     for surface in scene.surfaces:
@@ -83,10 +83,10 @@ def facet_tables(scene: Scene) -> kernels.Facets:
         order = arrange(np.ascontiguousarray(table.mean(axis=1).T), leaves)
         corners[first : first + len(table)] = table.reshape(-1, 9)[order]
         owner[first : first + len(table)] = number
-        kernels.fill(corners, first, leaves, LEAF, box, boxes)
+        visibility_kernels.fill(corners, first, leaves, LEAF, box, boxes)
     planes = np.empty((len(corners), 4))
-    kernels.planes_of(corners, planes)
-    return kernels.Facets(corners, planes, owner, boxes, np.array(roots, dtype=np.int64))
+    visibility_kernels.planes_of(corners, planes)
+    return beam_tables.Facets(corners, planes, owner, boxes, np.array(roots, dtype=np.int64))
 
 
 def follow_beam(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int, min_amplitude: float) -> Footprints:
@@ -111,18 +111,18 @@ def follow_beam(scene: Scene, beam: Beam, ccd: CCD, max_bounces: int, min_amplit
     """
     reflection, transmission = constants(scene)
     base = 2 * len(scene.surfaces) + 1
-    optics = kernels.Interfaces(reflection, transmission, base, max_bounces, min_amplitude**2)
+    optics = beam_tables.Interfaces(reflection, transmission, base, max_bounces, min_amplitude**2)
     return _joined(*_followed(scene, beam, ccd, optics))
 
 
 def _followed(
-    scene: Scene, beam: Beam, ccd: CCD, optics: kernels.Interfaces
+    scene: Scene, beam: Beam, ccd: CCD, optics: beam_tables.Interfaces
 ) -> tuple[list[list[Array]], FloatArray]:
     """Tables of footprints (corners, ends, waves, keys) for parts of the source, and the power."""
     facets = facet_tables(scene)
     size = float(np.nanmax(np.abs(facets.corners.reshape(-1, 3) - beam.centre)))
     slack = max(SAME_IN_PIXEL * ccd.pitch, SAME_IN_SCENE * size)
-    limits = kernels.Tolerances(SLIVER * ccd.pitch**2, slack, SAME_IN_SCENE * size)
+    limits = beam_tables.Tolerances(SLIVER * ccd.pitch**2, slack, SAME_IN_SCENE * size)
     source = np.concatenate([beam.centre, *beam.axes, np.zeros(4)])
     width, height = beam.size
     count = sum(len(surface.mesh.faces) for surface in scene.surfaces)

@@ -1,7 +1,7 @@
 """Compiled loops from footprints of beams to pixels: which pixel sees which, and exact means over pixels.
 
 Footprints are convex polygons in pixels, those of footprint n from corners[first[n]] to
-corners[first[n + 1]]; in each the light is a plane wave, a row of `beam_kernels.WAVE`. Members of pixel i
+corners[first[n + 1]]; in each the light is a plane wave, a row of `beam_tables.WAVE`. Members of pixel i
 are members[begin[i]] to members[begin[i + 1]].
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from fringetrace.core import jit, lean, part
-from fringetrace.field.beam_kernels import (
+from fringetrace.field.beam_tables import (
     DERIVATIVES,
     GRADIENT,
     IMAGINARY,

@@ -1,4 +1,4 @@
-"""Traced paths: ends and fates, optical path lengths, amplitudes, and the power ledger."""
+"""Traced paths: ends and fates, optical path lengths and amplitudes."""
 
 from __future__ import annotations
 
@@ -12,47 +12,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fringetrace.core import Array, ComplexArray, FloatArray, described, length_text, short_repr
+from fringetrace.core import Array, ComplexArray, FloatArray, described, length_text
 from fringetrace.scene import CCD, Beam, Scene, pixels
 from fringetrace.tracing.fates import Fate
+from fringetrace.tracing.ledger import Ledger
 from fringetrace.tracing.rays import Rays
-
-
-@dataclass(frozen=True)
-class Ledger:
-    """Power ledger: incident power by fate, in |amplitude|^2 * m^2 (or rays, where they have no area).
-
-    `truncated` is what was cut off by the number of bounces or by the least amplitude, and branches
-    that were not to be followed.
-    """
-
-    incident: float
-    detected: float
-    left: float
-    absorbed: float
-    truncated: float
-
-    __repr__ = short_repr
-
-    def _repr_html_(self) -> str:
-        total = self.incident or 1.0
-        rows = "".join(
-            f"<tr><th>{name}</th><td>{value:.6g}</td><td>{value / total:.4%}</td></tr>"
-            for name, value in vars(self).items()
-        )
-        head = "<tr><th>power</th><th></th><th>of the incident</th></tr>"
-        return f"<table>{head}{rows}</table>"
-
-    @property
-    def error(self) -> float:
-        """Unaccounted power, relative to the incident power."""
-        total = self.detected + self.left + self.absorbed + self.truncated
-        return abs(total - self.incident) / self.incident if self.incident else abs(total)
-
-    def __add__(self, other: Ledger) -> Ledger:
-        """Sum of two ledgers, item by item."""
-        mine, theirs = vars(self), vars(other)
-        return Ledger(**{name: mine[name] + theirs[name] for name in mine})
 
 
 @dataclass(frozen=True, eq=False)
