@@ -158,8 +158,11 @@ def _fits(made: type, member: Any) -> bool:
     """Whether what is of one class is of a type, too."""
     if _protocol(member):
         fields = {field.name for field in dataclasses.fields(made)}
-        public = {name for name in vars(member) if not name.startswith("_")}
-        return all(name in fields or hasattr(made, name) for name in public)
+        public = {name: value for name, value in vars(member).items() if not name.startswith("_")}
+        return all(
+            callable(getattr(made, name, None)) if callable(value) else name in fields or hasattr(made, name)
+            for name, value in public.items()
+        )
     if get_origin(member) is get_origin(Callable[[], None]):
         call, (arguments, result) = vars(made).get("__call__"), get_args(member)
         return call is not None and [*get_type_hints(call, localns=NAMES).values()] == [*arguments, result]
