@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 import fringetrace as ft
 from fringetrace import mm, nm, um
@@ -180,3 +181,20 @@ def test_what_is_not_for_facets_alone_is_refused(surface, beam, why):
 def test_no_paths_are_refused():
     with pytest.raises(ValueError, match="reconstruct_facet_waves: expected at least one Paths, got none"):
         reconstruct_facet_waves([])
+
+
+@pytest.mark.parametrize("subdivided", [0, 2])
+def test_no_light_is_lost_within_a_round_hole(subdivided):
+    """A ring of many sides on a block: what is lit within it would have more corners than a polygon holds."""
+    block, ring = trimesh.creation.box((10, 10, 2)), trimesh.creation.annulus(1.0, 1.8, 2e-4, sections=720)
+    block.apply_translation((0, 0, -1))
+    ring.apply_translation((2.2, -1.8, 1e-4))
+    part = trimesh.util.concatenate([block, ring])
+    for _ in range(subdivided):
+        part = part.subdivide()
+    part.apply_scale(mm)
+    beam = ft.Beam((0, 0, 9 * mm), (0, 0, -1), (0, 1, 0), (8 * mm, 8 * mm), (80, 80))
+    ccd = ft.CCD((0, 0, 5 * mm), (0, 0, -1), (0, 1, 0), 0.1 * mm, (64, 64))
+    paths = ft.trace(ft.Scene([ft.Surface(part, ft.Mirror())]), beam, ccd)
+    # all facets that are lit send light straight back: where pieces meet, to their roundings, it may be twice
+    np.testing.assert_allclose(ft.irradiance(paths, LAMBDA, "facets"), 1.0, rtol=0, atol=1e-6)

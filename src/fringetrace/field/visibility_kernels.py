@@ -235,8 +235,30 @@ def around(frame, table, row, gap, lines):
 
 
 @lean
+def halved(pieces, sizes, count):
+    """Cut polygons of many corners in two, that cuts to come find room; how many there are then."""
+    for k in range(count):
+        corners = sizes[k, 0]
+        if corners <= CORNERS // 2:
+            continue
+        if count == len(pieces):
+            return FULL
+        middle = corners // 2
+        for i in range(middle, corners):
+            pieces[count, i - middle, 0], pieces[count, i - middle, 1] = pieces[k, i, 0], pieces[k, i, 1]
+        pieces[count, corners - middle, 0] = pieces[k, 0, 0]
+        pieces[count, corners - middle, 1] = pieces[k, 0, 1]
+        sizes[count, 0], sizes[k, 0] = corners - middle + 1, middle + 1
+        count += 1
+    return count
+
+
+@lean
 def subtract(pieces, sizes, count, lines, total, least, spare, rest):
     """Take from polygons what lies inside all of some lines; how many are left."""
+    count = halved(pieces, sizes, count)
+    if count == FULL:
+        return FULL
     k = count
     while k > 0:
         k -= 1
