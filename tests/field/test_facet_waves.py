@@ -9,6 +9,7 @@ import trimesh
 import fringetrace as ft
 from fringetrace import mm, nm, um
 from fringetrace.core import rotation
+from fringetrace.field import facet_waves
 from fringetrace.field.facet_waves import reconstruct_facet_waves
 from fringetrace.geometry import shapes
 
@@ -198,3 +199,11 @@ def test_no_light_is_lost_within_a_round_hole(subdivided):
     paths = ft.trace(ft.Scene([ft.Surface(part, ft.Mirror())]), beam, ccd)
     # all facets that are lit send light straight back: where pieces meet, to their roundings, it may be twice
     np.testing.assert_allclose(ft.irradiance(paths, LAMBDA, "facets"), 1.0, rtol=0, atol=1e-6)
+
+
+def test_light_of_rays_that_no_footprint_reaches_is_counted():
+    paths = light([tilted(1e-3)])
+    waves = reconstruct_facet_waves(paths)
+    assert facet_waves._unlit(paths, waves.footprints, waves.begin, waves.member) == 0.0
+    dark = facet_waves._unlit(paths, waves.footprints, 0 * waves.begin, waves.member[:0])
+    assert dark == pytest.approx(paths.ledger().detected, rel=1e-12)

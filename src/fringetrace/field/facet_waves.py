@@ -255,12 +255,26 @@ def _reconstructed(parts: list[Paths]) -> FacetWaves:
     assert ccd is not None
     prints = found[0] if len(found) == 1 else _together(found)
     begin, member = _covered(prints, ccd.shape)
+    missed += sum(_unlit(paths, prints, begin, member) for paths in parts)
     waves = FacetWaves(
         ccd, prints, np.concatenate(path), np.concatenate(odd), begin, member, np.empty((0, 5)), before,
         missed / detected if detected > 0.0 else 0.0,
     )  # fmt: skip
     owner = np.repeat(np.arange(len(found)), [len(one) for one in found])
     return _profiled(waves, beams, owner)
+
+
+def _unlit(paths: Paths, prints: Footprints, begin: npt.NDArray[np.int64], member: Array) -> float:
+    """Power that rays bring to pixels which no footprint of their key reaches."""
+    assert paths.ccd is not None
+    rows, columns = paths.ccd.shape
+    seen = np.flatnonzero(paths.fate == Fate.DETECTED)
+    at = np.clip(np.floor(paths.pixel[seen]), 0, (rows - 1, columns - 1)).astype(np.int64)
+    keys, number = np.unique(np.concatenate([paths.key[seen], prints.key]), return_inverse=True)
+    lit = np.repeat(np.arange(rows * columns), np.diff(begin)) * len(keys) + number[len(seen) :][member]
+    found = np.isin((at[:, 0] * columns + at[:, 1]) * len(keys) + number[: len(seen)], lit)
+    power = (np.abs(paths.amplitude[seen][~found]) ** 2).sum()
+    return float(power * (1.0 if paths.area is None else paths.area))
 
 
 def _power(prints: Footprints, which: npt.NDArray[np.bool_]) -> float:
